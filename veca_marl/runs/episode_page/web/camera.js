@@ -23,6 +23,7 @@ export class View {
     this.distance = 3;
     this.target = new THREE.Vector3();
     this.shift = new THREE.Vector3(); // of the target, by dragging
+    this.centre = new THREE.Vector3(); // what it looks at
     this.pointers = new Map();
     this.changed = true;
     this.#listen(canvas);
@@ -42,7 +43,7 @@ export class View {
     this.mode = mode;
     this.shift.set(0, 0, 0);
     const radius = this.radius();
-    if (mode === "room") Object.assign(this, { distance: Math.min(2.1 * radius, 14), elevation: 0.75 });
+    if (mode === "room") Object.assign(this, { distance: Math.min(2.5 * radius, 16), elevation: 0.75 });
     if (mode === "follow") Object.assign(this, { distance: 2.1, elevation: 0.42 });
     this.target.copy(this.#goal());
     this.changed = true;
@@ -86,7 +87,7 @@ export class View {
       return;
     }
     this.target.lerp(this.#goal(), share);
-    const centre = this.target.clone().add(this.shift);
+    const centre = this.centre.copy(this.target).add(this.shift);
     const flat = Math.cos(this.elevation) * this.distance;
     camera.up.set(0, 0, 1);
     camera.position.set(

@@ -277,7 +277,7 @@ class Page {
     this.jumped = view.changed = false;
     view.update(jumped ? 1 : 1 - Math.exp(-6 * seconds), this.size[0] / this.size[1]);
     world.hideHeadOf(view.isInside ? this.agent : null);
-    this.isBusy = world.clearSight(view.camera, view.isInside, jumped);
+    this.isBusy = world.clearSight(view.camera, view.centre, view.isInside, jumped);
     const room = view.radius();
     const small = room < 7 && view.mode !== "follow";
     world.lightUp(small ? view.room().getCenter(view.target.clone()).setZ(0) : view.target, small ? room : 3.5);

@@ -5,6 +5,7 @@ import * as THREE from "three";
 const JUMP_M = 0.5; // per step; what moves farther was put there
 const TEXTURE_WIDTH = 128;
 const GHOST = 0.1;
+const STRIP_M = 0.12; // of a wall that would hide the agents
 const SKY = new THREE.Color().setRGB(0.6, 0.75, 0.95, THREE.SRGBColorSpace);
 
 const linear = (r, g, b) => new THREE.Color().setRGB(r, g, b, THREE.SRGBColorSpace);
@@ -140,6 +141,10 @@ const ONE = new THREE.Vector3(1, 1, 1);
 const A = new THREE.Vector3();
 const D = new THREE.Vector3();
 
+function isWall({ shape, rotation, checker }, [x, y, z]) {
+  return shape === "box" && !checker && Math.abs(rotation[2][2]) > 0.999 && z > 0.3 && Math.min(x, y) < 0.13;
+}
+
 class Primitive {
   constructor(geometry, episode) {
     this.frame = geometry.frame;
@@ -154,9 +159,13 @@ class Primitive {
     this.isFloor = episode.objects[geometry.object] === "floor" || Math.min(this.extent[0], this.extent[1]) > 8 * this.extent[2];
     this.mesh.castShadow = !this.isFloor && !geometry.transparent;
     this.mesh.receiveShadow = true;
-    this.mayGhost = !this.isFloor && Math.max(...this.extent) > 0.25;
+    this.isWall = isWall(geometry, this.extent);
+    this.mayGhost = !this.isFloor && !this.isWall && Math.max(...this.extent) > 0.25;
     this.isOwn = false;
+    this.isHidden = false;
     this.shade = 1;
+    this.height = 1; // share of it that is shown
+    solid.computeBoundingBox();
   }
 
   // Prepares `isBetween` for where it is now.
@@ -182,6 +191,27 @@ class Primitive {
     this.enter = Math.max(this.enter, Math.min(one, two));
     this.leave = Math.min(this.leave, Math.max(one, two));
     return this.enter < this.leave;
+  }
+
+  // Whether a wall is between two points, beside its ends too: then all of a row of walls is.
+  separates(from, to) {
+    const across = this.extent[0] < this.extent[1] ? "x" : "y";
+    const a = A.copy(from).applyMatrix4(this.inverse)[across];
+    return a * D.copy(to).applyMatrix4(this.inverse)[across] < 0;
+  }
+
+  // Lowers a wall to a strip, or raises it; one that begins above the strip vanishes.
+  lower(isLow, instantly) {
+    const { min, max } = this.mesh.geometry.boundingBox;
+    const { x, y } = this.mesh.quaternion;
+    const bottom = this.mesh.position.z + min.z;
+    const strip = bottom > 2 * STRIP_M ? 0 : STRIP_M / (max.z - min.z);
+    const goal = isLow && Math.hypot(x, y) < 1e-3 ? strip : 1;
+    this.height += instantly ? goal - this.height : 0.15 * (goal - this.height);
+    this.mesh.scale.z = Math.max(this.height, 1e-3);
+    this.mesh.position.z += min.z * (1 - this.height);
+    this.mesh.visible = !this.isHidden && this.height > 0.02;
+    return Math.abs(goal - this.height) > 0.01;
   }
 
   fade(ghost, instantly) {
@@ -474,19 +504,22 @@ export class World {
     return this.poses.point(this.episode.firstFrames[agent.object], target);
   }
 
-  // Lets what stands between the camera and the agents become transparent.
-  // Returns whether something is still on its way.
-  clearSight(camera, isInside, instantly) {
-    let isFading = false;
+  // Lets what stands between the camera and the agents become low or transparent. Returns whether
+  // something is still on its way.
+  clearSight(camera, centre, isInside, instantly) {
     const from = camera.position;
     const points = this.episode.agents.map((agent) => this.focus(agent));
+    let isBusy = false;
     for (const primitive of this.primitives) {
-      if (!primitive.mayGhost || primitive.isOwn) continue;
-      if (!isInside) primitive.settle();
-      const blocks = !isInside && points.some((point) => primitive.isBetween(from, point));
-      isFading = primitive.fade(blocks, instantly) || isFading;
+      if (primitive.isOwn || !(primitive.mayGhost || primitive.isWall)) continue;
+      this.poses.place(primitive.frame, primitive.mesh);
+      primitive.settle();
+      const moving = primitive.isWall
+        ? primitive.lower(!isInside && primitive.separates(from, centre), instantly)
+        : primitive.fade(!isInside && points.some((point) => primitive.isBetween(from, point)), instantly);
+      isBusy = moving || isBusy;
     }
-    return isFading;
+    return isBusy;
   }
 
   hideHeadOf(agent) {
@@ -501,7 +534,8 @@ export class World {
     this.primitives.forEach((primitive, n) => {
       const frame = primitive.frame - this.episode.firstFrames[geometries[n].object];
       const hide = agent !== null && geometries[n].object === agent.object && agent.hiddenFrames.includes(frame);
-      primitive.mesh.visible = !hide;
+      primitive.isHidden = hide;
+      primitive.mesh.visible = !hide && primitive.height > 0.02;
     });
   }
 
