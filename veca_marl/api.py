@@ -381,7 +381,7 @@ def save_episode(
     ):
         recorder = EpisodeRecorder(env, longest_s)
         recorder.record(play(env, ExpertPolicy(env) if policy is None else policy))
-        details = {"policy": "expert" if policy is None else "own", "seed": seed}
+        details = {"policy": "expert" if policy is None else "given", "seed": seed}
         write_page(file, recorder.episode(cfg.task.name, details, SAMPLE_RATE_HZ))
     return file
 

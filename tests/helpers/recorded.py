@@ -53,6 +53,8 @@ def record(*overrides, longest_s=None, policy=random_policy):
                 recorder.begin()
             else:
                 recorder.add(played)
+                if recorder.is_cut:
+                    break
                 recorded.played.append(played.clone())
             recorded.copy(env.games[0])
         recorded.weights = env.games[0].weights

@@ -56,6 +56,9 @@ class EpisodeRecorder:
     It reads what the agents observe and never changes the game: call `begin` after the reset, `add`
     after each step, and `episode` at the end.
 
+    Attributes:
+        is_cut: Whether a step was left out since the recording was as long as it may be.
+
     Args:
         env: The environment, with the samples of the ears (`GameCfg.with_waveform`) for sound.
         longest_s: Seconds after which nothing more is recorded; None for no limit.
@@ -64,6 +67,7 @@ class EpisodeRecorder:
     def __init__(self, env: VecaEnv, longest_s: float | None = None) -> None:
         self._env = env
         self._step_s = env.cfg.clock.step_s
+        self.is_cut = False
         self._most = None if longest_s is None else max(round(longest_s / self._step_s), 1)
 
     def begin(self) -> None:
@@ -75,7 +79,7 @@ class EpisodeRecorder:
         self._positions: list[NDArray[Any]] = []
         self._rotations: list[NDArray[Any]] = []
         self._repaintings: list[Repainting] = []
-        self._is_cut = False
+        self.is_cut = False
         frames = len(scene.positions)
         self._tracks = [
             _Track(self._game, player, frames + 2 * number)
@@ -95,7 +99,7 @@ class EpisodeRecorder:
         self.begin()
         for played in steps:
             self.add(played)
-            if self._is_cut:
+            if self.is_cut:
                 return
 
     def add(self, played: TensorDictBase) -> None:
@@ -104,8 +108,8 @@ class EpisodeRecorder:
         Args:
             played: What `step` of the environment returned: actions, and `next`.
         """
-        if self._is_cut or (self._most is not None and self.steps >= self._most):
-            self._is_cut = True
+        if self.is_cut or (self._most is not None and self.steps >= self._most):
+            self.is_cut = True
             return
         self._sample()
         for team, names in self._env.group_map.items():
@@ -152,7 +156,7 @@ class EpisodeRecorder:
             _continuous(flat.reshape(*rotations.shape[:2], 4)),
             self._repaintings,
             [track.finished() for track in self._tracks],
-            self._is_cut,
+            self.is_cut,
         )
 
 

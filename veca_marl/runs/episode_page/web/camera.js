@@ -44,7 +44,7 @@ export class View {
     this.shift.set(0, 0, 0);
     const radius = this.radius();
     if (mode === "room") Object.assign(this, { distance: Math.min(2.5 * radius, 16), elevation: 0.75 });
-    if (mode === "follow") Object.assign(this, { distance: 2.1, elevation: 0.42 });
+    if (mode === "follow") Object.assign(this, { distance: 1.8, elevation: 0.4 });
     this.target.copy(this.#goal());
     this.changed = true;
   }
@@ -72,7 +72,7 @@ export class View {
   #goal() {
     if (this.mode === "room") return this.room().getCenter(new THREE.Vector3()).setZ(0.2);
     const goal = this.world.focus(this.agent);
-    return goal.setZ(Math.max(goal.z, 0.15));
+    return goal.setZ(Math.max(goal.z, 0.15) + 0.05);
   }
 
   // Places the camera; `share` of the way to where the agent is, for a smooth ride.

@@ -88,7 +88,7 @@ class Choice extends Row {
 // Many values in [-1, 1]: a row of pixels for each, blue for negative, orange for positive ones.
 class HeatMap extends Row {
   constructor(label, values, names, count) {
-    super(label, Math.min(Math.max(3 * count, 44), 132), `${count} values from -1 (blue) to 1 (orange)`);
+    super(label, Math.min(Math.max(3 * count, 44), 96), `${count} values from -1 (blue) to 1 (orange)`);
     Object.assign(this, { values, names, count });
   }
 
@@ -263,7 +263,7 @@ export class Timeline {
 
   #show(row) {
     const line = document.createElement("div");
-    line.className = "track";
+    line.className = row.height > 60 ? "track tall" : "track";
     line.title = row.hint;
     line.style.setProperty("--height", `${row.height}px`);
     const label = document.createElement("span");
