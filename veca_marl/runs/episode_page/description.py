@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.runs.episode_page.body_chart import chart_pose
 from veca_marl.runs.episode_page.episode import Agent, Episode, Geometry, Repainting, SceneInfo
 from veca_marl.runs.episode_page.media import sound_file
 from veca_marl.runs.episode_page.packing import Packer, unpack
@@ -26,6 +27,7 @@ def describe(episode: Episode, packer: Packer) -> dict[str, Any]:
     """Return the description of an episode, in values of JSON; its arrays go to the packer."""
     scene = episode.scene
     packer.add_plain("colours", scene.colours.astype(np.float32))
+    packer.add_plain("chart", chart_pose().astype(np.float32))
     return {
         "format": FORMAT,
         "version": __version__,

@@ -147,6 +147,7 @@ export async function readEpisode() {
   episode.motion = await readMotion(episode, store);
   episode.meshes = await readMeshes(episode, store);
   episode.colours = await store.array("colours");
+  episode.chart = await store.array("chart");
   await Promise.all(episode.agents.map((agent, number) => readAgent(agent, number, store)));
   episode.duration = episode.steps * episode.stepS;
   return episode;

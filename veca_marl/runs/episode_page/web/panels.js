@@ -59,7 +59,6 @@ class SkinView {
     this.canvas = document.getElementById("skinview");
     this.context = this.canvas.getContext("2d");
     this.label = document.getElementById("touched");
-    this.last = 0;
   }
 
   setAgent(agent) {
@@ -69,23 +68,22 @@ class SkinView {
     this.isDue = true;
   }
 
-  // Draws at most some times per second: two more pictures of a body are not free.
-  show(step, now) {
-    if (!this.agent.touch) return;
-    const { firsts } = this.agent.touch;
-    const count = firsts[step + 1] - firsts[step];
-    this.label.textContent = count === 0 ? "nothing touches it" : `${count} of 9888 taxels`;
-    if (!this.world || (!this.isDue && now - this.last < 90)) return;
-    this.last = now;
-    if (!this.isDue && step === this.step) return;
+  show(step) {
+    const { touch } = this.agent;
+    if (!touch || (!this.isDue && step === this.step)) return;
+    const count = touch.firsts[step + 1] - touch.firsts[step];
+    this.label.textContent = count === 0 ? "touches nothing" : `${count} of 9888 taxels`;
+    // an empty chart stays as it is
+    const isSame = !this.isDue && count === 0 && this.count === 0;
     this.step = step;
+    this.count = count;
+    if (!this.world || isSame) return;
     this.isDue = false;
-    this.world.isOverdrawn = true;
     const ratio = this.world.renderer.getPixelRatio();
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    const [w, h] = [Math.floor(width / 2) * 2 * ratio, height * ratio];
+    const [w, h] = [2 * Math.floor(Math.floor(width / 2) * ratio), Math.floor(height * ratio)];
     if (this.canvas.width !== w || this.canvas.height !== h) Object.assign(this.canvas, { width: w, height: h });
-    this.world.drawSkin(this.agent, this.context, width, height);
+    this.world.drawSkin(this.agent, step, this.context, width, height);
   }
 }
 

@@ -547,40 +547,59 @@ export class World {
     this.renderer.render(this.scene, camera);
   }
 
-  // Front and back of a body with an upright pelvis, pale, with its touched skin, as a 2D picture.
-  drawSkin(agent, context, width, height) {
-    const skin = this.skinOf(agent);
-    if (!skin) return;
-    const pelvis = this.episode.firstFrames[agent.object];
-    const up = this.poses.axis(pelvis, 2);
-    const ahead = this.poses.axis(pelvis, 0);
-    const centre = new THREE.Vector3();
-    for (let v = 0; v < skin.vertices.length; v += 3) centre.add(new THREE.Vector3(skin.vertices[v], skin.vertices[v + 1], skin.vertices[v + 2]));
-    centre.multiplyScalar(3 / skin.vertices.length);
-    const ratio = this.renderer.getPixelRatio();
+  // Front and back of a body in the pose of the chart, pale, with its touched skin, as a 2D picture.
+  drawSkin(agent, step, context, width, height) {
+    const chart = this.#chartOf(agent);
+    if (!chart) return;
+    chart.feel(agent.touch, step);
+    const { renderer } = this;
+    const ratio = renderer.getPixelRatio();
     const half = Math.floor(width / 2);
-    const camera = new THREE.PerspectiveCamera(35, half / height, 0.1, 10);
+    const [w, h] = [Math.floor(half * ratio), Math.floor(height * ratio)];
+    const camera = new THREE.PerspectiveCamera(28, half / height, 0.1, 10);
     camera.layers.set(1);
-    skin.mesh.layers.enable(1);
-    skin.uniforms.uPale.value = 1;
-    const shadows = this.renderer.shadowMap.enabled;
-    this.renderer.shadowMap.autoUpdate = false;
-    this.renderer.setClearColor(0x000000, 0);
-    context.clearRect(0, 0, width * ratio, height * ratio);
+    camera.up.set(0, 0, 1);
+    const distance = (1.06 * chart.size.z) / 2 / Math.tan((14 * Math.PI) / 180);
+    chart.mesh.visible = true;
+    renderer.shadowMap.autoUpdate = false;
+    renderer.setClearColor(0x000000, 0);
+    renderer.setViewport(0, 0, half, height);
+    renderer.setScissor(0, 0, half, height);
+    renderer.setScissorTest(true);
+    context.clearRect(0, 0, context.canvas.width, context.canvas.height);
     for (const [n, way] of [1, -1].entries()) {
-      camera.position.copy(centre).addScaledVector(ahead, 1.5 * way).addScaledVector(up, 0.35);
-      camera.up.copy(up);
-      camera.lookAt(centre);
-      this.renderer.setViewport(0, 0, half, height);
-      this.renderer.setScissor(0, 0, half, height);
-      this.renderer.setScissorTest(true);
-      this.renderer.render(this.scene, camera);
-      const canvas = this.renderer.domElement;
-      const [w, h] = [half * ratio, height * ratio];
-      context.drawImage(canvas, 0, canvas.height - h, w, h, n * w, 0, w, h);
+      camera.position.copy(chart.centre);
+      camera.position.x += way * (distance + chart.size.x / 2);
+      camera.lookAt(chart.centre);
+      renderer.render(this.scene, camera);
+      context.drawImage(renderer.domElement, 0, renderer.domElement.height - h, w, h, n * w, 0, w, h);
     }
-    this.renderer.shadowMap.autoUpdate = shadows;
-    skin.uniforms.uPale.value = 0;
-    skin.mesh.layers.disable(1);
+    chart.mesh.visible = false;
+    this.isOverdrawn = true;
+  }
+
+  #chartOf(agent) {
+    const skin = this.episode.skins.find((each) => each.object === agent.object);
+    if (!skin || !agent.touch) return null;
+    this.charts ??= new Map();
+    if (!this.charts.has(skin.mesh)) this.charts.set(skin.mesh, this.#makeChart(skin));
+    const chart = this.charts.get(skin.mesh);
+    if (chart.agent !== agent) Object.assign(chart, { agent, touchStep: -1 });
+    return chart;
+  }
+
+  #makeChart(skin) {
+    const chart = new Skin(skin, this.episode, this.episode.taxels);
+    const own = chart.mesh0.frames.every((frame) => 12 * frame < this.episode.chart.length);
+    chart.firstFrame = own ? 0 : this.episode.firstFrames[skin.object];
+    chart.deform(own ? { matrix: this.episode.chart } : this.poses);
+    chart.uniforms.uPale.value = 1;
+    chart.mesh.castShadow = chart.mesh.receiveShadow = false;
+    chart.mesh.layers.set(1);
+    chart.mesh.geometry.computeBoundingBox();
+    chart.centre = chart.mesh.geometry.boundingBox.getCenter(new THREE.Vector3());
+    chart.size = chart.mesh.geometry.boundingBox.getSize(new THREE.Vector3());
+    this.scene.add(chart.mesh);
+    return chart;
   }
 }
