@@ -82,7 +82,7 @@ def _describe_skins(scene: SceneInfo, packer: Packer) -> list[dict[str, Any]]:
     names: dict[bytes, str] = {}
     skins = []
     for number, mesh in scene.skins.items():
-        arrays = {
+        arrays: dict[str, NDArray[Any]] = {
             "frames": mesh.frames.astype(np.uint16),
             "weights": mesh.weights.astype(np.float32),
             "offsets": mesh.offsets.astype(np.float32),
