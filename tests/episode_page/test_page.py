@@ -1,18 +1,21 @@
 """A page holds what was recorded, and nothing else; damaged pages are refused."""
 
 import re
+from contextlib import closing
 from dataclasses import replace
 from io import BytesIO
 
 import av
 import numpy as np
 import pytest
+from composed import compose
 from recorded import RATE_HZ, record
 from refusals import naming
 from scipy.spatial.transform import Rotation
 
 from veca_marl.algos.evaluation.evaluate import random_policy
-from veca_marl.runs.episode_page import read_page, write_page
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.runs.episode_page import EpisodeRecorder, play, read_page, write_page
 from veca_marl.runs.episode_page.description import POSITION_UNIT_M, QUATERNION_UNIT
 from veca_marl.runs.episode_page.media import picture_sheet, read_sheet, sound_file
 from veca_marl.runs.episode_page.page import page_of
@@ -106,6 +109,37 @@ def test_changed_colours_are_recorded(tmp_path):
     assert change.step == 3
     colours[change.surfaces] = change.colours
     np.testing.assert_allclose(colours, made.colours[-1], atol=1e-4)
+
+
+def test_players_that_follow_a_script_are_recorded(tmp_path):
+    """They sense and move like others; their actions and rewards are not those of a policy."""
+    made = record("+task=PushOut1v1", "opponent.blue=random", "task.max_seconds=0.2")
+    write_page(tmp_path / "scripted.html", made.episode)
+    red, blue = read_page(tmp_path / "scripted.html").agents
+    assert (red.name, blue.name) == ("red", "blue")
+    assert red.actions
+    assert red.terms
+    assert not blue.actions
+    assert blue.pictures
+    assert blue.touch
+
+
+def test_a_recording_ends_before_a_step_that_is_not_finite(tmp_path):
+    game = compose(KICK).game
+    with closing(VecaEnv(game, 1, 3)) as env:
+        recorder = EpisodeRecorder(env)
+        for step, played in enumerate(play(env, random_policy(env))):
+            if step == 5:
+                env.games[0].world.scene.positions[-1] = np.nan
+            if step == 0:
+                recorder.begin()
+            else:
+                recorder.add(played)
+        episode = recorder.episode("broken", {}, RATE_HZ)
+    assert episode.steps == 4
+    assert episode.is_cut
+    write_page(tmp_path / "broken.html", episode)
+    assert np.isfinite(read_page(tmp_path / "broken.html").positions).all()
 
 
 def test_nothing_is_loaded_from_elsewhere(page):

@@ -57,7 +57,8 @@ class EpisodeRecorder:
     after each step, and `episode` at the end.
 
     Attributes:
-        is_cut: Whether a step was left out since the recording was as long as it may be.
+        is_cut: Whether a step was left out, since the recording was as long as it may be, or the
+            simulation broke down.
 
     Args:
         env: The environment, with the samples of the ears (`GameCfg.with_waveform`) for sound.
@@ -108,7 +109,9 @@ class EpisodeRecorder:
         Args:
             played: What `step` of the environment returned: actions, and `next`.
         """
-        if self.is_cut or (self._most is not None and self.steps >= self._most):
+        is_full = self._most is not None and self.steps >= self._most
+        # after a step that broke the simulation down there is nothing to show
+        if self.is_cut or is_full or not np.isfinite(self._game.world.scene.positions).all():
             self.is_cut = True
             return
         self._sample()

@@ -145,6 +145,8 @@ class Page {
     for (const name of ["pointerdown", "pointermove", "wheel", "keydown", "click"]) {
       document.addEventListener(name, () => this.stir(), { passive: true });
     }
+    // the space bar then plays, whatever was clicked last
+    document.addEventListener("click", (event) => event.detail && event.target.closest("button")?.blur());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#recolour());
   }
 
