@@ -50,6 +50,7 @@ def page_of(episode: Episode) -> str:
     description |= {"arrays": packer.entries, "bytes": len(block), "crc": zlib.crc32(block)}
     parts = {
         "title": html.escape(f"{episode.title} - veca_marl"),
+        "licence": _web_text("LICENSE.three"),
         "style": _web_text("viewer.css"),
         "description": _json(description),
         "data": base64.b64encode(block).decode(),
