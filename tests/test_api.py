@@ -11,11 +11,13 @@ from refusals import naming
 
 import veca_marl
 from veca_marl import api
+from veca_marl.algos.evaluation.evaluate import random_policy
 from veca_marl.algos.networks.encoders import Precision
 from veca_marl.api import GameChoices, as_integer, choose
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.override_text import quoted
+from veca_marl.runs.episode_page import read_page
 from veca_marl.runs.run_folder import RunFolder
 
 TINY = ["collect=one_process", "collect.worlds=1", "collect.steps=32", "algo.minibatches=2"]
@@ -174,3 +176,22 @@ def test_overrides_of_every_part_of_the_game_have_effect(script):
     assert (game.task.max_seconds, game.clock.control_rate_hz) == (0.4, 10)
     assert game.body_of("red") != game.body_of("blue")
     assert game.script == {"blue": Script(script)}
+
+
+def test_an_episode_is_saved_as_a_page(tmp_path):
+    """By the policy that `train` returns, too: it plays what it has learnt."""
+    env = veca_marl.make("KickTheBall", senses=BLIND, seed=0)
+    policy = random_policy(env)
+    env.close()
+    short = {"senses": BLIND, "overrides": ["task.max_seconds=0.8"]}
+    path = veca_marl.save_episode(
+        tmp_path / "a.html", "KickTheBall", policy=policy, longest_s=0.4, **short
+    )
+    episode = read_page(path)
+    assert episode.steps == 10
+    assert episode.is_cut
+    assert episode.agents[0].pictures is None
+    with pytest.raises(ConfigError, match=naming("a.htm", ".html")):
+        veca_marl.save_episode("a.htm", "KickTheBall")
+    with pytest.raises(ConfigError, match=naming("longest_s", "0")):
+        veca_marl.save_episode(tmp_path / "b.html", "KickTheBall", longest_s=0.0)

@@ -13,7 +13,7 @@ TRAINER = SimpleNamespace(policy=SimpleNamespace(play="policy"), evaluation_seed
 
 def video(monkeypatch, record):
     monkeypatch.setattr(training, "record_episode", record)
-    return LastVideo("final.mp4", "game", TRAINER)
+    return LastVideo("final.mp4", "game", TRAINER, "episode.html")
 
 
 def test_the_first_episode_of_the_evaluation_is_recorded(monkeypatch):
@@ -21,7 +21,7 @@ def test_the_first_episode_of_the_evaluation_is_recorded(monkeypatch):
     made = video(monkeypatch, lambda *arguments: recorded.append(arguments))
     made.record()
     made.check()
-    assert recorded == [("final.mp4", "game", "policy", 3)]
+    assert recorded == [("final.mp4", "game", "policy", 3, "episode.html")]
 
 
 def test_an_error_is_raised_when_the_run_has_stored_its_checkpoint(monkeypatch):

@@ -23,6 +23,7 @@ IN_RUNS = (
     "tensorboard",
     "pool",
     "videos/final.mp4",
+    "videos/episode.html",
     "wandb",
     "notes.txt",
 )

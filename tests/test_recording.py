@@ -1,5 +1,7 @@
 """The video of a real episode: images of the eyes, sound at the ears."""
 
+from itertools import pairwise
+
 import av
 import numpy as np
 import pytest
@@ -77,3 +79,10 @@ def test_a_blind_agent_is_recorded_from_the_room(tmp_path):
     _, seeing, _ = record(tmp_path / "seeing.mp4")
     _, blind, _ = record(tmp_path / "blind.mp4", "senses/vision=blind")
     assert blind[0].shape[1] < seeing[0].shape[1]
+
+
+def test_the_last_picture_is_of_the_episode_that_ends(tmp_path):
+    """The room does not jump to the start of the next episode."""
+    _, pictures, _ = record(tmp_path / "video.mp4", "senses/vision=blind")
+    moved = [np.abs(b.astype(int) - a).mean() for a, b in pairwise(pictures)]
+    assert moved[-1] < 3.0 * max(moved[:-1])

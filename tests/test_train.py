@@ -77,7 +77,8 @@ def test_smoke_run_writes_all_files(smoke):
     files = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
     assert {
         "config.yaml", "provenance.json", "metrics.csv", "evaluations.csv", "comparison.txt",
-        "progress.json", "timing.txt", "videos/final.mp4", "checkpoints/best.pt",
+        "progress.json", "timing.txt", "videos/final.mp4", "videos/episode.html",
+        "checkpoints/best.pt",
         "checkpoints/frames_000000000256.pt",
     } <= files  # fmt: skip
     assert any(name.startswith("tensorboard/events") for name in files)

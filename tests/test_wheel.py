@@ -45,6 +45,14 @@ def test_the_wheel_contains_every_configuration_file(wheel):
     assert not [n for n in names if n.startswith(("tests/", "tools/", "conf/", "experiments/"))]
 
 
+def test_the_wheel_contains_the_viewer_of_episodes(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    web = "veca_marl/runs/episode_page/web/"
+    expected = {p.name for p in (ROOT / web).iterdir()}
+    assert {"template.html", "three.module.min.js", "LICENSE.three"} <= expected
+    assert {n.removeprefix(web) for n in names if n.startswith(web)} == expected
+
+
 PROGRAM = """
 import gymnasium, runpy, sys
 env = gymnasium.make("veca_marl:veca_marl/KickTheBall-v0", senses={"vision": "blind"})

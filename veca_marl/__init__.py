@@ -1,9 +1,9 @@
 """Human-like agents that see, hear and feel in one world, and learn.
 
 `make` returns a task for TorchRL, `gym_env` for Gymnasium, `parallel_env` for PettingZoo, `connect`
-one that another machine serves; `train` trains on a task; `check_task` checks one; `list_tasks`
-returns the names that they take. They are imported at their first use, so that the simulator
-(`veca_marl.sim`) can be used without loading torch.
+one that another machine serves; `train` trains on a task; `save_episode` plays one into a page for
+browsers; `check_task` checks one; `list_tasks` returns the names that they take. They are imported
+at their first use, so that the simulator (`veca_marl.sim`) can be used without loading torch.
 
 Importing this package registers the Gymnasium ids `veca_marl/<task>-v0`.
 """
@@ -17,7 +17,16 @@ from veca_marl.gymnasium_ids import register_ids
 from veca_marl.version import __version__
 
 if TYPE_CHECKING:
-    from veca_marl.api import check_task, connect, gym_env, list_tasks, make, parallel_env, train
+    from veca_marl.api import (
+        check_task,
+        connect,
+        gym_env,
+        list_tasks,
+        make,
+        parallel_env,
+        save_episode,
+        train,
+    )
 
 __all__ = [
     "__version__",
@@ -27,6 +36,7 @@ __all__ = [
     "list_tasks",
     "make",
     "parallel_env",
+    "save_episode",
     "train",
 ]
 

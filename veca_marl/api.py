@@ -1,29 +1,33 @@
 """Functions for notebooks and scripts: the choices of the command line as arguments.
 
 `make`, `gym_env` and `parallel_env` make the environment of a task, `connect` that of a server's,
-`train` trains on it, `check_task` checks it.
+`train` trains on it, `save_episode` plays it into a page for browsers, `check_task` checks it.
 """
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable, Container, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import fields
 from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any, ParamSpec, TypedDict, TypeVar, Unpack
 
 import torch
+from torchrl.envs import ExplorationType, set_exploration_type
 
+from veca_marl.algos.evaluation.evaluate import ActionPolicy
 from veca_marl.checks import CheckCfg, TaskReport, check_game
 from veca_marl.config import Config, ConfigError, compose, compose_node, to_config
-from veca_marl.config.command_line import check_folder
+from veca_marl.config.command_line import check_file, check_folder
 from veca_marl.config.overrides import parse, root_of
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.spaces import SpaceLayout
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import TASKS, Task
 from veca_marl.gymnasium_ids import register_task
@@ -32,10 +36,12 @@ from veca_marl.plugins import load_plugins
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, find_device, make_trainer
 from veca_marl.runs.continuation import resume_argument
+from veca_marl.runs.episode_page import EpisodeRecorder, play, write_page
 from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import new_run
 from veca_marl.runs.served_worlds import import_remote
 from veca_marl.runs.training import TrainingResult, run_training
+from veca_marl.runs.video import SAMPLE_RATE_HZ
 
 # `opponent` is the configuration of `GameCfg.script`
 _GAME_ROOTS = {f.name for f in fields(GameCfg)} - {"script"} | {"opponent", "plugins"}
@@ -401,6 +407,57 @@ def train(
         if run is not None:
             run.begin(node, chosen)
         return run_training(cfg, run, trainer)
+
+
+@_with_choices
+def save_episode(
+    path: str | Path,
+    task: str,
+    *,
+    policy: ActionPolicy | None = None,
+    seed: int = 1,
+    longest_s: float | None = None,
+    **choices: Unpack[GameChoices],
+) -> Path:
+    """Play one episode and store it as a page that any browser opens from disk.
+
+    The page shows the world in 3D and, for each agent on one time line, what it sees, hears, feels,
+    does and is rewarded for. It needs neither a server nor a network.
+
+    Args:
+        path: The HTML file; missing folders are created.
+        task: One of `list_tasks`.
+        policy: Writes the actions of all teams into the TensorDict of an environment, such as the
+            `policy` that `train` returns, which plays by its most likely actions; None is the
+            expert of the task.
+        seed: Seed of the episode.
+        longest_s: Seconds after which the recording ends; None is the whole episode.
+        **choices: As for `make`.
+
+    Returns:
+        The file.
+
+    Raises:
+        ConfigError: If there is no such choice, or no file can be written there.
+        ValueError: If a number is impossible, or the task has no expert.
+        WriteError: If the file cannot be written.
+    """
+    file = check_file(path, "path")
+    if file.suffix != ".html":
+        raise ConfigError(f"path={path}: must end in .html")
+    if longest_s is not None and not 0.0 < longest_s < math.inf:
+        raise ConfigError(f"longest_s={longest_s} must be a positive number of seconds, or None")
+    cfg = choose(task, **choices).with_waveform()
+    with (
+        closing(VecaEnv(cfg, 1, as_integer("seed", seed))) as env,
+        torch.no_grad(),
+        set_exploration_type(ExplorationType.DETERMINISTIC),
+    ):
+        recorder = EpisodeRecorder(env, longest_s)
+        recorder.record(play(env, ExpertPolicy(env) if policy is None else policy))
+        details = {"policy": "expert" if policy is None else "given", "seed": seed}
+        write_page(file, recorder.episode(cfg.task.name, details, SAMPLE_RATE_HZ))
+    return file
 
 
 @_with_choices

@@ -15,6 +15,7 @@ from veca_marl.envs.core.benchmark import start_state
 from veca_marl.play.command import main
 from veca_marl.play.screen import HEIGHT, WIDTH
 from veca_marl.play.session import Session
+from veca_marl.runs.episode_page import read_page
 
 TASK = ["+task=KickTheBall", "playground=simple", "task.max_seconds=0.4"]
 
@@ -54,6 +55,8 @@ def test_a_deaf_agent_has_a_video_without_sound(tmp_path):
         (["policy=champion"], ("policy=champion", "expert", "random")),
         (["episodes=0"], ("episodes", " 1", " 0")),
         (["video=kick.avi"], ("video=kick.avi", ".mp4")),
+        (["save=kick.htm"], ("save=kick.htm", ".html")),
+        (["save=kick.html"], ("save=kick.html", "video=")),
     ],
 )
 def test_wrong_options_end_in_one_line(tmp_path, capsys, wrong, parts):
@@ -98,3 +101,19 @@ def test_a_session_sums_the_weighted_terms_of_each_episode():
     assert sums[0] == sums[2], "an episode is repeated by its number"
     assert sums[0] != sums[1]
     assert np.isfinite(sums).all()
+
+
+@pytest.mark.slow
+def test_an_episode_is_saved_as_a_page(tmp_path, capsys):
+    path = tmp_path / "new" / "kick.html"
+    assert main([*TASK, f"save={path}", "policy=random", "episodes=2"]) == 0
+    read = read_page(path)
+    assert read.steps == 10
+    assert read.title == "KickTheBall"
+    assert read.details == {"policy": "random", "seed": "1", "episode": "1"}
+    assert "episode 1: return" in capsys.readouterr().out
+
+
+def test_the_keyboard_needs_a_window(capsys, tmp_path):
+    assert main([*TASK, f"save={tmp_path / 'a.html'}", "policy=keyboard"]) == 2
+    assert re.search(naming("keyboard", "save="), capsys.readouterr().err.splitlines()[-1])

@@ -38,6 +38,8 @@ class LogCfg:
         progress_bar: A progress bar while training.
         video: Whether an episode of the trained policy is recorded at the end, with the sound at
             the ears of the agent.
+        episode: Whether the episode of the video is stored as a page as well, `episode.html`, which
+            any browser opens from disk.
         keep_checkpoints: Number of latest checkpoints that are kept beside the best one.
     """
 
@@ -46,6 +48,7 @@ class LogCfg:
     )
     progress_bar: bool = True
     video: bool = True
+    episode: bool = True
     keep_checkpoints: int = 3
 
     def __post_init__(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from veca_marl.envs.core.game import Game, Observation
 from veca_marl.sim.geometry import Floats, Pose, Scene, SceneObject
 from veca_marl.sim.physics.rooms import RoomCfg
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, load_taxels, taxel_positions
+from veca_marl.sim.touch.parts import skin_parts
 from veca_marl.sim.vision import Camera, look_at
 
 PALE = (0.86, 0.86, 0.84)
@@ -49,6 +51,23 @@ def touch_image(
     return np.concatenate(
         [_portrait(scene, body, readings, camera, pose) for pose in _viewpoints(body)], axis=1
     )
+
+
+def touch_readings(observation: Mapping[str, NDArray[Any]]) -> Floats | None:
+    """Return the readings of all taxels, ``(1648, 6)`` in [0, 1]; None without touch.
+
+    With `touch_parts` only, every taxel of a part has the greatest reading of the part.
+    """
+    if "touch" in observation:
+        return observation["touch"].reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
+    if "touch_parts" not in observation:
+        return None
+    readings = np.zeros(load_taxels().depths.shape)
+    parts = skin_parts()
+    maxima = observation["touch_parts"][len(parts) :]
+    for part, reading in zip(parts, maxima, strict=True):
+        readings[part.triangles] = reading
+    return readings
 
 
 def save_touch_image(

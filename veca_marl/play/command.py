@@ -4,7 +4,9 @@ A window opens (extra ``[play]``) in which keys steer the first agent if it walk
 ``policy=expert``, ``policy=random`` or ``policy=runs/...`` that policy plays. With
 ``video=FILE.mp4`` no window opens, and whole episodes are written into a video. The picture shows
 the room, both eyes, the spectra at both ears, the touched skin and the terms of the reward of the
-first agent; the sound is that at its ears. A run is played on its stored configuration.
+first agent; the sound is that at its ears. A run is played on its stored configuration. With
+``save=FILE.html`` one episode becomes a page that any browser opens from disk: the world in 3D, and
+what each agent sees, hears, feels, does and is rewarded for on one time line.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.play.screen import HEIGHT, WIDTH, Screen
 from veca_marl.play.session import EXPERT, KEYBOARD, Choice, Moment, Session, choose
 from veca_marl.play.steering import Keyboard, SteeredPolicy
+from veca_marl.runs.episode_page import EpisodeRecorder, write_page
 from veca_marl.runs.video import SAMPLE_RATE_HZ, VideoFile
 
 
@@ -58,6 +61,29 @@ def film(path: Path, session: Session, episodes: int, title: str) -> list[float]
         if sound:
             file.add_sound(np.concatenate(sound, axis=1))
     return returns
+
+
+def save(path: Path, session: Session, number: int, details: dict[str, object]) -> float:
+    """Play a whole episode and write it as a page.
+
+    Args:
+        path: The file.
+        session: What is played.
+        number: Number of the episode, from 0 on.
+        details: Lines of text on the page by name.
+
+    Returns:
+        The return of the first actor.
+    """
+    recorder = EpisodeRecorder(session.env)
+    moment = session.begin(number)
+    recorder.begin()
+    while not moment.done:
+        moment = session.step()
+        recorder.add(session.played)
+    title = session.env.cfg.task.name
+    write_page(path, recorder.episode(title, details, SAMPLE_RATE_HZ))
+    return sum(moment.sums.values())
 
 
 def _moments(session: Session, episode: int) -> Iterator[Moment]:
@@ -91,15 +117,18 @@ class PlayOptions:
 
     Attributes:
         policy: What plays: keyboard, expert, random, the folder of a run, or a checkpoint in it.
-            None is the keyboard in a window and the expert in a video.
-        video: MP4 file to write; None opens a window.
-        episodes: Number of episodes; None is one in a video, and any number in a window.
+            None is the keyboard in a window and the expert in a file.
+        video: MP4 file to write; without it and `save` a window opens.
+        save: HTML file to write, an episode that any browser opens from disk.
+        episodes: Number of episodes; None is one in a file, and any number in a window. A page
+            shows the last of them.
         seed: Seed of the episodes.
         play: How it is played.
     """
 
     policy: str | None = None
     video: str | None = None
+    save: str | None = None
     episodes: int | None = None
     seed: int = 1
     play: PlayCfg = field(default_factory=PlayCfg)
@@ -111,17 +140,24 @@ class PlayOptions:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
         if self.video is not None and not self.video.endswith(".mp4"):
             raise ValueError(f"video={self.video}: must end in .mp4")
-        if self.video is not None and self.policy == KEYBOARD:
-            raise ValueError(f"policy={KEYBOARD} needs a window; leave out video={self.video}")
+        if self.save is not None and not self.save.endswith(".html"):
+            raise ValueError(f"save={self.save}: must end in .html")
+        if self.save is not None and self.video is not None:
+            raise ValueError(f"save={self.save} and video={self.video}: give one of them")
+        for option, file in (("video", self.video), ("save", self.save)):
+            if file is not None and self.policy == KEYBOARD:
+                raise ValueError(f"policy={KEYBOARD} needs a window; leave out {option}={file}")
 
 
 def run(options: PlayOptions, overrides: list[str]) -> None:
-    """Play in a window, or write a video."""
+    """Play in a window, or write a video or a page."""
     torch.set_num_threads(1)
-    if options.video is None:
-        _play(options, overrides)
-    else:
+    if options.save is not None:
+        _save(options, overrides, check_file(options.save, "save"))
+    elif options.video is not None:
         _film(options, overrides, check_file(options.video, "video"))
+    else:
+        _play(options, overrides)
 
 
 def _film(options: PlayOptions, overrides: list[str], path: Path) -> None:
@@ -133,6 +169,19 @@ def _film(options: PlayOptions, overrides: list[str], path: Path) -> None:
     for episode, total in enumerate(returns):
         print(f"episode {episode}: return {total:.3f}")
     print(f"{path}: {len(returns)} episodes")
+
+
+def _save(options: PlayOptions, overrides: list[str], path: Path) -> None:
+    policy = options.policy or EXPERT
+    session = _session(choose(policy, overrides), options)
+    number = (options.episodes or 1) - 1
+    details = {"policy": policy, "seed": options.seed, "episode": number}
+    try:
+        total = save(path, session, number, details)
+    finally:
+        session.close()
+    print(f"episode {number}: return {total:.3f}")
+    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, opens in any browser")
 
 
 def _play(options: PlayOptions, overrides: list[str]) -> None:
@@ -160,7 +209,8 @@ def _import_window() -> ModuleType:
         return import_module("veca_marl.play.window")
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            "a window needs pygame: pip install 'veca_marl[play]'; video=FILE.mp4 needs none",
+            "a window needs pygame: pip install 'veca_marl[play]'; video=FILE.mp4 and "
+            "save=FILE.html need none",
             name=error.name,
         ) from error
 
@@ -175,6 +225,6 @@ def _session(choice: Choice, options: PlayOptions) -> Session:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    return CommandLine("play", PlayOptions, str(__doc__), _ERRORS, outputs=("video",)).run(
+    return CommandLine("play", PlayOptions, str(__doc__), _ERRORS, outputs=("video", "save")).run(
         run, words
     )

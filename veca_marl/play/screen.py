@@ -10,12 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.rendering import RoomView, touch_image
+from veca_marl.envs.rendering import RoomView, touch_image, touch_readings
 from veca_marl.play.session import Moment, Session
-from veca_marl.sim.geometry import Floats, Scene, SceneObject
+from veca_marl.sim.geometry import Scene, SceneObject
 from veca_marl.sim.hearing import AudioSense
-from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, load_taxels
-from veca_marl.sim.touch.parts import skin_parts
 
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]
@@ -147,26 +145,12 @@ def skin_panel(
         observation: Its observation; without touch the panel states that.
         height: Height of the panel in pixels.
     """
-    readings = _readings(observation)
+    readings = touch_readings(observation)
     if readings is None:
         return absent(height, 2 * (height * 2 // 3), "skin: no touch")
     panel = np.ascontiguousarray(touch_image(scene, body, readings, height))
     largest = readings.max(initial=0.0)
     return titled(panel, f"skin, front and back; greatest reading {largest:.2f}")
-
-
-def _readings(observation: Mapping[str, NDArray[Any]]) -> Floats | None:
-    """Return the readings of all taxels, ``(1648, 6)``; None without touch."""
-    if "touch" in observation:
-        return observation["touch"].reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
-    if "touch_parts" not in observation:
-        return None
-    readings = np.zeros(load_taxels().depths.shape)
-    parts = skin_parts()
-    maxima = observation["touch_parts"][len(parts) :]
-    for part, reading in zip(parts, maxima, strict=True):
-        readings[part.triangles] = reading
-    return readings
 
 
 EAR_TITLES = ("left ear", "right ear")

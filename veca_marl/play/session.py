@@ -65,6 +65,7 @@ class Session:
         env: The world; with the samples of the ears where the actors hear.
         game: The game in it.
         policy: The policy.
+        played: What the environment returned for the last step: actions of all teams, and `next`.
 
     Args:
         cfg: What to play.
@@ -116,9 +117,9 @@ class Session:
     def step(self) -> Moment:
         """Play one step of the present episode."""
         with torch.no_grad(), set_exploration_type(self._exploration):
-            played = self._playing.step(self.policy(self._state))
-        self._state = step_mdp(played)
-        self._moment = self._next_moment(played["next"])
+            self.played = self._playing.step(self.policy(self._state))
+        self._state = step_mdp(self.played)
+        self._moment = self._next_moment(self.played["next"])
         return self._moment
 
     def _next_moment(self, step: TensorDictBase) -> Moment:

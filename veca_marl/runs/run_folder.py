@@ -108,6 +108,11 @@ class RunFolder:
         return self.path / "videos" / "final.mp4"
 
     @property
+    def episode(self) -> Path:
+        """The same episode as a page for browsers."""
+        return self.path / "videos" / "episode.html"
+
+    @property
     def pool(self) -> Path:
         """The folder of past policies (self-play)."""
         return self.path / "pool"
@@ -159,7 +164,7 @@ class RunFolder:
 
     def _remove_left_behind(self) -> None:
         """Remove the temporary files of processes that were killed: this one holds the lock."""
-        ours = (self.config, self.provenance, self.progress, self.video)
+        ours = (self.config, self.provenance, self.progress, self.video, self.episode)
         names = re.compile("|".join(re.escape(path.name) for path in ours))
         for folder in (self.path, self.video.parent):
             for path in left_behind(folder, names):
@@ -248,6 +253,7 @@ _WRITTEN = (
     "checkpoints",
     "pool",
     "videos/final.mp4",
+    "videos/episode.html",
 )
 _LINKABLE = ("provenance.json", "videos", "tensorboard", "wandb", "mlflow.db")
 

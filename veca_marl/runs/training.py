@@ -80,18 +80,21 @@ class LastVideo:
         path: The file.
         game: The game.
         trainer: Its policy acts.
+        page: An HTML file of the same episode; None writes none.
     """
 
-    def __init__(self, path: Path, game: GameCfg, trainer: Trainer) -> None:
-        self._path, self._game, self._trainer = path, game, trainer
+    def __init__(
+        self, path: Path, game: GameCfg, trainer: Trainer, page: Path | None = None
+    ) -> None:
+        self._path, self._game, self._trainer, self._page = path, game, trainer, page
         self._error: Exception | None = None
 
     def record(self) -> None:
         """Record it; an exception is kept for `check`."""
-        trainer = self._trainer
+        policy, seed = self._trainer.policy.play, self._trainer.evaluation_seed
         try:
             with timeit("evaluate/video"):
-                record_episode(self._path, self._game, trainer.policy.play, trainer.evaluation_seed)
+                record_episode(self._path, self._game, policy, seed, self._page)
         except WorkerError:  # of the evaluation, which ends the run
             raise
         except Exception as error:
@@ -133,7 +136,8 @@ def run_training(
         trainer.reporters = [memory, *written]
         video = None
         if folder is not None and cfg.log.video:
-            video = LastVideo(folder.video, cfg.game, trainer)
+            page = folder.episode if cfg.log.episode else None
+            video = LastVideo(folder.video, cfg.game, trainer, page)
             trainer.during_last_evaluation = video.record
         comparison = trainer.run()
         if video is not None and folder is not None:

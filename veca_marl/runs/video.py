@@ -20,9 +20,9 @@ from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.evaluation.evaluate import ActionPolicy
 from veca_marl.algos.files import new_temporary
-from veca_marl.algos.networks.memory import with_memory
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.runs.episode_page import EpisodeRecorder, play, write_page
 
 _PEAK = 0.8  # of full scale
 # Codecs and their options; the first that is available is used. The default preset of x264 takes
@@ -203,7 +203,12 @@ def animated_gif(path: Path, fps: int = 10, scale: float = 0.5) -> bytes:
 SAMPLE_RATE_HZ = 22_050  # of the ears
 
 
-def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -> None:
+LONGEST_PAGE_S = 60.0  # of the page that a run leaves: about 3 MB per agent that sees and hears
+
+
+def record_episode(
+    path: Path, game: GameCfg, policy: ActionPolicy, seed: int, page: Path | None = None
+) -> None:
     """Play one episode with the policy's most likely actions and write it as a video.
 
     It shows the first agent of the first team, with the sound that the agent receives; without
@@ -214,6 +219,8 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
         game: The game.
         policy: Writes the actions of all teams.
         seed: Seed of the episode.
+        page: An HTML file of the same episode with all agents, its first minute if it is longer;
+            None writes none.
     """
     frames: list[NDArray[np.uint8]] = []
     sound: list[NDArray[Any]] = []
@@ -222,17 +229,23 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
         torch.no_grad(),
         set_exploration_type(ExplorationType.DETERMINISTIC),
     ):
-        playing = with_memory(env, policy)
-        state, done = playing.reset(), False
-        while not done:
-            played, state = playing.step_and_maybe_reset(policy(state))
+        episode = play(env, policy)
+        next(episode)
+        recorder = EpisodeRecorder(env, LONGEST_PAGE_S)
+        if page is not None:
+            recorder.begin()
+        for played in episode:
             seen = _first_player(played["next"], env)
             frames.append(env.spectators[0].frame(seen))
             if "waveform" in seen:
                 sound.append(seen["waveform"])
-            done = bool(played["next", "done"].all())
+            if page is not None:
+                recorder.add(played)
     waveform = np.concatenate(sound, axis=1) if sound else None
     write_video(path, frames, waveform, game.clock.control_rate_hz, SAMPLE_RATE_HZ)
+    if page is not None:
+        details = {"policy": "trained", "seed": seed}
+        write_page(page, recorder.episode(game.task.name, details, SAMPLE_RATE_HZ))
 
 
 def _first_player(step: TensorDictBase, env: VecaEnv) -> dict[str, NDArray[Any]]:
