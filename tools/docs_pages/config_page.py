@@ -93,7 +93,7 @@ def sections(cfg_type: type, path: str) -> Iterator[tuple[str, type]]:
 
 def _subclasses(base: type) -> list[type]:
     """Return all subclasses, without those with subclasses that no name chooses."""
-    found = []
+    found: list[type] = []
     for child in base.__subclasses__():
         own = _subclasses(child)
         found += own if own and getattr(child, "name", None) == "" else [child, *own]
