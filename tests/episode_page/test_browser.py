@@ -131,7 +131,8 @@ def test_sound_seeks_and_slows_down_with_the_time(opened):
     opened.run("episodePage.setSpeed(0.1); episodePage.clock.seek(0.5); episodePage.toggle()")
     opened.wait_until("episodePage.clock.sound.position() > 0.5")
     began, rate, speed = opened.await_(
-        "const s = episodePage.clock.sound; const now = () => [s.position(), s.context.currentTime];"
+        "const s = episodePage.clock.sound;"
+        "const now = () => [s.position(), s.context.currentTime];"
         "const a = now(); await new Promise((go) => setTimeout(go, 400)); const b = now();"
         "return [a[0], s.source.playbackRate.value, (b[0] - a[0]) / (b[1] - a[1])]"
     )
