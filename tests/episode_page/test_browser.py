@@ -96,6 +96,51 @@ def test_touched_taxels_are_marked(opened, made):
     np.testing.assert_allclose(marked / 255.0, touch, atol=1.0 / 255.0)
 
 
+def coloured(browser):
+    """The number of pixels of the chart of the skin that are neither grey nor blank."""
+    return browser.run(
+        "const c = document.getElementById('skinview'); let n = 0;"
+        "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+        "for (let i = 0; i < d.length; i += 4) n += d[i + 3] > 200 && d[i] - d[i + 2] > 60;"
+        "return n"
+    )
+
+
+def test_the_chart_shows_what_is_touched(opened, made):
+    name = made.episode.agents[0].name
+    step = max(range(51), key=lambda n: made.observations[n][name]["touch"].sum())
+    opened.run(f"episodePage.clock.seek({0.04 * step})")
+    opened.wait_until(f"episodePage.panels.parts[1].step === {step}")
+    assert coloured(opened) > 5
+    opened.run("episodePage.agent.touch.firsts.fill(0); episodePage.clock.seek(0.4)")
+    opened.wait_until("episodePage.panels.parts[1].step === 10")
+    assert coloured(opened) == 0
+
+
+def test_a_click_on_the_time_line_seeks(opened):
+    opened.run(
+        "const t = episodePage.timeline; const r = t.box.getBoundingClientRect();"
+        "t.box.setPointerCapture = () => {};"
+        "t.box.dispatchEvent(new PointerEvent('pointerdown', {button: 0,"
+        "clientX: r.left + t.area.left + 0.75 * t.area.width, clientY: r.top + 20}))"
+    )
+    assert opened.run("return episodePage.clock.time") == pytest.approx(1.5, abs=0.02)
+
+
+def test_sound_seeks_and_slows_down_with_the_time(opened):
+    opened.run("episodePage.setSpeed(0.1); episodePage.clock.seek(0.5); episodePage.toggle()")
+    opened.wait_until("episodePage.clock.sound.position() > 0.5")
+    began, rate, speed = opened.await_(
+        "const s = episodePage.clock.sound;"
+        "const now = () => [s.position(), s.context.currentTime];"
+        "const a = now(); await new Promise((go) => setTimeout(go, 400)); const b = now();"
+        "return [a[0], s.source.playbackRate.value, (b[0] - a[0]) / (b[1] - a[1])]"
+    )
+    assert 0.5 < began < 2.0
+    assert rate == pytest.approx(0.1)
+    assert speed == pytest.approx(0.1, rel=0.2)
+
+
 def test_eyes_are_those_of_the_chosen_agent(opened, made):
     opened.run("episodePage.setAgent(1); episodePage.clock.seek(30 * 0.04)")
     opened.wait_until("episodePage.panels.parts[0].step === 30")
