@@ -17,17 +17,19 @@ from av.codec.codec import UnknownCodecError
 from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torchrl.envs import ExplorationType, set_exploration_type
+from torchrl.envs.utils import step_mdp
 
 from veca_marl.algos.evaluation.evaluate import ActionPolicy
 from veca_marl.algos.files import new_temporary
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.rendering import Film, FilmCfg, FilmQuality
 
 _PEAK = 0.8  # of full scale
 # Codecs and their options; the first that is available is used. The default preset of x264 takes
 # more processor time than the episode itself, this one a fifth of that.
-_VIDEO_CODECS = {"libx264": {"preset": "ultrafast"}, "mpeg4": {}}
+_VIDEO_CODECS = {"libx264": {"preset": "veryfast", "crf": "21"}, "mpeg4": {}}
 
 
 def write_video(
@@ -140,7 +142,8 @@ def _add_pictures(
     assert isinstance(stream, av.VideoStream)
     stream.height, stream.width = shape[:2]
     stream.pix_fmt = "yuv420p"
-    stream.bit_rate = 2_000_000
+    if codec != "libx264":  # which keeps the quality constant instead
+        stream.bit_rate = 4_000_000
     return stream
 
 
@@ -201,6 +204,8 @@ def animated_gif(path: Path, fps: int = 10, scale: float = 0.5) -> bytes:
 
 
 SAMPLE_RATE_HZ = 22_050  # of the ears
+FILM = FilmCfg(width=960, height=540, quality=FilmQuality.good)
+"""The films of training runs."""
 
 
 def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -> None:
@@ -222,12 +227,14 @@ def record_episode(path: Path, game: GameCfg, policy: ActionPolicy, seed: int) -
         torch.no_grad(),
         set_exploration_type(ExplorationType.DETERMINISTIC),
     ):
+        film = Film(env.games[0], FILM)
         playing = with_memory(env, policy)
         state, done = playing.reset(), False
         while not done:
-            played, state = playing.step_and_maybe_reset(policy(state))
+            played = playing.step(policy(state))
+            state = step_mdp(played)
             seen = _first_player(played["next"], env)
-            frames.append(env.spectators[0].frame(seen))
+            frames.append(film.picture(seen))
             if "waveform" in seen:
                 sound.append(seen["waveform"])
             done = bool(played["next", "done"].all())

@@ -11,15 +11,17 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.adapters.human_window import HumanWindow
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, Observation, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.core.task import SOLVED
-from veca_marl.envs.rendering import Spectator
+from veca_marl.envs.rendering import FilmQuality, Spectator
 from veca_marl.sim.kernel_cache import announce_compilation
 
-RENDER_MODES = ("rgb_array",)
+HUMAN = "human"
+RENDER_MODES = (HUMAN, "rgb_array")
 
 
 class Step(NamedTuple):
@@ -81,9 +83,11 @@ class SeededGame:
     Args:
         cfg: What to play.
         seed: As for `VecaEnv`; None is fresh entropy.
-        render_mode: `rgb_array` if `render` is to be called.
+        render_mode: `rgb_array` if `render` is to be called; `human` shows each reset and step in a
+            window.
 
     Raises:
+        ModuleNotFoundError: If a window is wanted, without the extra ``[play]``.
         ValueError: If there is no such render mode, or the seed is negative.
     """
 
@@ -91,6 +95,9 @@ class SeededGame:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode={render_mode!r}; choices: {[None, *RENDER_MODES]}")
         self._episodes = Episodes(seed)
+        self._window: HumanWindow | None = None
+        if render_mode == HUMAN:
+            self._window = HumanWindow(cfg.task.name, cfg.clock.control_rate_hz)
         announce_compilation()
         self.game = Game(cfg)
         self.names = [player.name for player in self.game.actors]
@@ -129,6 +136,7 @@ class SeededGame:
         self._episodes, self.rng = episodes, rng
         self.game.reset(rng)
         self._running = True
+        self._show()
         return self._observe(self.names)
 
     def first_info(self, name: str) -> dict[str, Any]:
@@ -157,6 +165,7 @@ class SeededGame:
         names = self.playing
         outcome = self.game.step(actions)
         self._running = not outcome.done
+        self._show()
         return Step(
             self._observe(names),
             {name: float(self.game.reward_of(outcome.terms[name])) for name in names},
@@ -197,8 +206,11 @@ class SeededGame:
             if player.name in names
         }
 
-    def render(self) -> NDArray[np.uint8]:
-        """Return what the first player perceives beside the room, ``(252, width, 3)`` uint8.
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture of the game for people, ``(360, 640, 3)`` uint8.
+
+        Returns:
+            The picture; None with `render_mode="human"`, where a window shows it.
 
         Raises:
             RuntimeError: If the environment was made without `render_mode`, not yet reset, or is
@@ -209,9 +221,20 @@ class SeededGame:
             raise RuntimeError(f"made without a render_mode; choices: {list(RENDER_MODES)}")
         if self.rng is None:
             raise RuntimeError("no episode has begun: call reset() before render()")
-        return self._spectator.frame(self.game.observe(self.game.actors[0]))
+        if self._window is not None:  # it shows this moment already
+            return None
+        return self._spectator.frame()
+
+    def _show(self) -> None:
+        """Show this moment in the window, if there is one."""
+        if self._window is not None and not self._window.is_closed:
+            # a window has to keep the speed of the clock
+            picture = self._spectator.frame(width=960, height=540, quality=FilmQuality.fast)
+            self._window.show(picture)
 
     def close(self) -> None:
         """Release the resources of the world."""
         self._running, self._closed = False, True
+        if self._window is not None:
+            self._window.close()
         self.game.close()
