@@ -1,7 +1,8 @@
 """Human-like agents that see, hear and feel in one world, and learn.
 
 `make` returns a task for TorchRL, `gym_env` for Gymnasium, `parallel_env` for PettingZoo; `train`
-trains on a task; `check_task` checks one; `list_tasks` returns the names that they take. They are
+trains on a task; `check_task` checks one; `list_tasks` returns the names that they take; `zoo` has
+policies that have learnt already. They are
 imported at their first use, so that the simulator (`veca_marl.sim`) can be used without loading
 torch.
 
@@ -24,6 +25,8 @@ __all__ = ["__version__", "check_task", "gym_env", "list_tasks", "make", "parall
 
 def __getattr__(name: str) -> Any:
     """Import `veca_marl.api` at the first use of one of its functions (PEP 562)."""
+    if name == "zoo":
+        return import_module("veca_marl.zoo")
     if name in __all__:
         return getattr(import_module("veca_marl.api"), name)
     raise AttributeError(f"module 'veca_marl' has no attribute {name!r}; choices: {__all__}")

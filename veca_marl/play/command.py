@@ -95,7 +95,8 @@ class PlayOptions:
     """Options of the command.
 
     Attributes:
-        policy: What plays: keyboard, expert, random, the folder of a run, or a checkpoint in it.
+        policy: What plays: keyboard, expert, random, zoo/NAME, the folder of a run, or a checkpoint
+            in it.
             None is the keyboard in a window and the expert in a video.
         video: MP4 file to write; None opens a window.
         episodes: Number of episodes; None is one in a video, and any number in a window.

@@ -111,9 +111,9 @@ class CameraOperator:
         ground = self._smooth("ground", np.array([*body.position[:2], 0.0]))
         target = ground + 0.55 * heading + 0.38 * _UP
         aside = np.cross(_UP, heading)
-        eye = ground - 1.75 * heading + 0.35 * aside + 1.35 * _UP
+        eye = ground - 1.7 * heading + 0.6 * aside + 1.35 * _UP
         head = np.array([*body.position[:2], 0.6])
-        return Shot(look_at(self._reached(head, eye), target), 52.0)
+        return Shot(look_at(self._reached(head, eye), target), 47.0)
 
     def _orbit(self) -> Shot:
         points = self._points()
@@ -129,8 +129,8 @@ class CameraOperator:
         fov_deg = 38.0
         radius = float(np.linalg.norm(points - target, axis=1).max())
         away = self._smooth("away", np.array([radius]))[0] / math.sin(math.radians(fov_deg) / 2.0)
-        eye = self._reached(target, target + max(0.92 * away, 0.9) * way)
-        return Shot(look_at(eye, target), self._fitting(eye, target, points, (fov_deg, 80.0)))
+        eye = self._reached(target, target + max(0.85 * away, 0.9) * way)
+        return Shot(look_at(eye, target), self._fitting(eye, target, points, (24.0, 80.0)))
 
     def _room(self) -> Shot:
         room = self._room_of_players()

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.vision.rasterizer import Depths, Lens, Surfaces
 
-Plane: TypeAlias = tuple[float, float, float, float, float]
-"""A point in the frame of the sun's camera (metres right, up and away), and by how much the surface
-there recedes per metre to the right and upwards."""
+Plane: TypeAlias = tuple[float, float, float, float, float, float]
+"""A point in the frame of the sun's camera (metres right, up and away), by how much the surface
+there recedes per metre to the right and upwards, and by how much another one has to be nearer."""
 
 SUN_RADIUS = 0.07
 """Tangent of the angular radius of the sun: that of a bright window rather than of the sky's."""
@@ -95,7 +95,9 @@ def sunlit_fractions(
             if _is_open(right, up, away, sun_view, sun_lens, tallest):
                 continue
             turn = _noise(i, j) * 2.0 * math.pi
-            plane = right, up, away, slope_x, slope_y
+            texel_m = 2.0 * sun_lens.tan_x * away / shadow_map.shape[0]
+            margin_m = _MARGIN_M + texel_m * (abs(slope_x) + abs(slope_y))
+            plane = right, up, away, slope_x, slope_y, margin_m
             fractions[j, i] = _fraction(
                 plane, math.cos(turn), math.sin(turn), discs, sun_lens, shadow_map
             )
@@ -161,12 +163,13 @@ def _fraction(
         shadow_map: ``(N, N)`` its depths.
     """
     blockers, samples = discs
+    margin_m = plane[5]
     found, total = 0, 0.0
     for k in range(blockers.shape[0]):
         a, b = _SEARCHED_M * blockers[k, 0], _SEARCHED_M * blockers[k, 1]
         gap = _gap(plane, a * cosine - b * sine, a * sine + b * cosine, lens, shadow_map)
         # a surface beside the cone between the point and the sun hides nothing of it
-        if gap > _MARGIN_M and gap * SUN_RADIUS * 1.5 + 0.01 > math.sqrt(a * a + b * b):
+        if gap > margin_m and gap * SUN_RADIUS * 1.5 + 0.01 > math.sqrt(a * a + b * b):
             found, total = found + 1, total + gap
     if found == 0:
         return 1.0
@@ -175,14 +178,14 @@ def _fraction(
     for k in range(samples.shape[0]):
         a, b = spread * samples[k, 0], spread * samples[k, 1]
         gap = _gap(plane, a * cosine - b * sine, a * sine + b * cosine, lens, shadow_map)
-        seen += gap <= _MARGIN_M
+        seen += gap <= margin_m
     return float(seen / samples.shape[0])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _gap(plane: Plane, x: float, y: float, lens: Lens, shadow_map: Depths) -> float:
     """Return by how much the map is nearer to the sun than the receiving plane beside a point."""
-    right, up, away, slope_x, slope_y = plane
+    right, up, away, slope_x, slope_y, _ = plane
     size = shadow_map.shape[0]
     expected = away + x * slope_x + y * slope_y
     column = int(((right + x) / expected / lens.tan_x + 1.0) * 0.5 * size)
