@@ -46,7 +46,7 @@ class Clip:
     """
 
     episode: int = 0
-    seconds: float = 8.0
+    seconds: float = 6.4
     camera: CameraKind = CameraKind.auto
     overrides: tuple[str, ...] = ()
 
