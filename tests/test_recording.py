@@ -76,5 +76,5 @@ def test_mono_gives_equal_channels_and_deaf_none(tmp_path):
 def test_a_blind_agent_is_recorded_without_panels_of_eyes(tmp_path):
     _, seeing, _ = record(tmp_path / "seeing.mp4")
     _, blind, _ = record(tmp_path / "blind.mp4", "senses/vision=blind")
-    assert blind[0].shape == seeing[0].shape == (540, 960, 3)
+    assert blind[0].shape == seeing[0].shape == (450, 800, 3)
     assert (blind[0] != seeing[0]).any()

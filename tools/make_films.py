@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from veca_marl.play.session import EXPERT, Moment, Session, choose
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 LARGEST_BYTES, ALL_BYTES = 1_500_000, 25_000_000
+SHORTEST_S = 6.0
 WIDTH, HEIGHT = 640, 360
 _OVERSIZED = 1.5  # of what is rendered: smooth edges at half the cost of twice the size
 Image = NDArray[np.uint8]
@@ -68,7 +69,11 @@ def film(task: str, clip: Clip, path: Path) -> None:
     cfg = FilmCfg(clip.camera, "", width, height, panels=False, quality=FilmQuality.good)
     session = _session(task, clip)
     view = Film(session.game, cfg)
-    pictures = [_reduced(view.picture()) for _ in _moments_of(session, clip, view.picture)]
+    pictures: list[Image] = []
+    while len(pictures) < SHORTEST_S * session.steps_per_s:  # episodes of some tasks are short
+        moments = _moments_of(session, clip, view.picture)
+        pictures += [_reduced(view.picture()) for _ in moments]
+        clip = replace(clip, episode=clip.episode + 1)
     _write_webm(path, pictures, session.steps_per_s)
     session.close()
 

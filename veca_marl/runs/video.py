@@ -204,7 +204,7 @@ def animated_gif(path: Path, fps: int = 10, scale: float = 0.5) -> bytes:
 
 
 SAMPLE_RATE_HZ = 22_050  # of the ears
-FILM = FilmCfg(width=960, height=540, quality=FilmQuality.good)
+FILM = FilmCfg(width=800, height=450, quality=FilmQuality.good)
 """The films of training runs."""
 
 

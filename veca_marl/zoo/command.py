@@ -165,7 +165,7 @@ def _add(options: AddOptions, overrides: list[str]) -> None:
     print(f"{path}: {path.stat().st_size} bytes")
 
 
-_ACTIONS = ("add", "list")
+_ACTIONS = ["add", "list"]
 
 
 def main(words: Sequence[str] | None = None) -> int:

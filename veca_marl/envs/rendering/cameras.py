@@ -111,7 +111,7 @@ class CameraOperator:
         ground = self._smooth("ground", np.array([*body.position[:2], 0.0]))
         target = ground + 0.55 * heading + 0.38 * _UP
         aside = np.cross(_UP, heading)
-        eye = ground - 1.7 * heading + 0.6 * aside + 1.35 * _UP
+        eye = ground - 1.5 * heading + 0.55 * aside + 1.2 * _UP
         head = np.array([*body.position[:2], 0.6])
         return Shot(look_at(self._reached(head, eye), target), 47.0)
 

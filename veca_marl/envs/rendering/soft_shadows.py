@@ -25,7 +25,7 @@ Plane: TypeAlias = tuple[float, float, float, float, float, float]
 there recedes per metre to the right and upwards, and by how much another one has to be nearer."""
 
 SUN_RADIUS = 0.07
-"""Tangent of the angular radius of the sun: that of a bright window rather than of the sky's."""
+"""Tangent of the angular radius of the sun, which is that of a bright window."""
 
 _SEARCHED_M = 0.10  # radius in which surfaces that cast shadows are searched
 _MARGIN_M = 0.006  # by which a surface has to be nearer to the sun
