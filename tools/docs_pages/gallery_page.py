@@ -12,6 +12,7 @@ from veca_marl.envs.core.task import TASKS
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "experiments" / "experts" / "benchmark"
 
+FILMS = Path(__file__).resolve().parents[2] / "docs" / "_static" / "films"
 EXPERT = "expert"
 HEAD = """# Gallery
 
@@ -37,16 +38,27 @@ def gallery_page() -> str:
 def entry(task: str) -> str:
     """Return the part of the page of one task."""
     name, rules, agents, senses, body, _ = overview_row(TASKS[task])
-    source = f"../_static/films/{task}.webm"
     lines = [
         f"### {task}",
-        "```{raw} html\n"
-        f'<video src="{source}" width="640" height="360" autoplay loop muted playsinline '
-        f'preload="none" controls title="{task}"></video>\n```',
+        moving(task) if (FILMS / f"{task}.webm").exists() else still(task),
         f"{rules}.",
         f"{name}: {senses}; body {body}; agents {agents}; {success(task)}.",
     ]
     return "\n\n".join(lines)
+
+
+def still(task: str) -> str:
+    """Return the picture of a task whose clip has not been made."""
+    return f"![{task}](../images/tasks/{task}.png)"
+
+
+def moving(task: str) -> str:
+    """Return the clip of a task in HTML."""
+    return (
+        "```{raw} html\n"
+        f'<video src="../_static/films/{task}.webm" width="640" height="360" autoplay loop muted '
+        f'playsinline preload="metadata" controls title="{task}"></video>\n```'
+    )
 
 
 def success(task: str) -> str:

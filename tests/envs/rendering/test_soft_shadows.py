@@ -65,6 +65,14 @@ def test_shadows_are_softer_far_from_what_casts_them():
     assert widths[1] > 1.5 * widths[0]
 
 
+def test_walls_cast_no_shadow():
+    """So that no agent acts in the dark."""
+    red, bare = floor([0.5], (2.0, 0.05, 0.5)), floor([])
+    seen = np.isfinite(red)
+    far = seen & (np.abs(np.arange(200) - 99.5) > 15)[None]  # beside the contact shadow
+    np.testing.assert_allclose(red[far], bare[far], atol=2.0)
+
+
 def test_without_soft_shadows_a_plate_in_the_air_darkens_nothing():
     red, bare = floor([0.8], soft=False), floor([], soft=False)
     seen = np.isfinite(red)

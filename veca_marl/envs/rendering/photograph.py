@@ -16,7 +16,7 @@ from veca_marl.envs.rendering.soft_shadows import (
     sunlit_fractions,
     tallest_nearby,
 )
-from veca_marl.sim.geometry import Bools, Floats, GeomTable, Pose, Scene
+from veca_marl.sim.geometry import Bools, Floats, GeomTable, Pose, Scene, bounding_radius
 from veca_marl.sim.vision.camera import Camera, look_at, view_axes
 from veca_marl.sim.vision.contact_shadows import darken_contact_shadows
 from veca_marl.sim.vision.mesh_rasterizer import draw_meshes, illuminate_triangles
@@ -39,6 +39,7 @@ _LIT_RADII_M = tuple(0.75 * 1.25**n for n in range(18))  # of what a shadow map 
 _EXPOSURE = np.round(255.0 * np.minimum(1.12 * np.linspace(0.0, 1.0, 256), 1.0) ** 0.85).astype(
     np.uint8
 )
+_LARGEST_M = 1.3  # bounding radius of the largest piece of furniture
 _GRID_M = 0.25  # of its centre, so that shadows do not tremble while a camera moves
 
 
@@ -169,7 +170,7 @@ def _shadows(
     """
     sun_view, sun = _sun_camera(camera, view, buffers, quality.map_px)
     # things that are hidden from the camera cast shadows all the same
-    shadow_map = _buffers(scene, sun, sun_view, draw_masks(scene)).depth
+    shadow_map = _buffers(scene, sun, sun_view, _casting(scene)).depth
     fractions = np.empty_like(lights)
     sunlit_fractions(
         view,
@@ -187,6 +188,16 @@ def _shadows(
     shadowed = np.where(fractions < 0.0, lights, lights - direct * (1.0 - fractions))
     factors: Depths = (shadowed / lights).astype(np.float32)
     return factors
+
+
+def _casting(scene: Scene) -> DrawMasks:
+    """Return what casts shadows: all but walls and floors, so that no corner of a room is dark."""
+    masks, geoms = draw_masks(scene), scene.geoms
+    small = [
+        bounding_radius(shape, size) <= _LARGEST_M
+        for shape, size in zip(geoms.shapes, geoms.sizes, strict=True)
+    ]
+    return masks._replace(opaque=masks.opaque & np.array(small, np.bool_))
 
 
 def _sun_camera(
