@@ -19,11 +19,12 @@ from veca_marl.algos.policy_files import LARGEST_BYTES, read_policy
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.transfer import load_actor, load_learnt
 from veca_marl.config import ConfigError, compose
+from veca_marl.envs.core.benchmark import parameters
 from veca_marl.evaluate import main as evaluate
 from veca_marl.play.command import main as play
 from veca_marl.policy_paths import policy_path, zoo_names
 from veca_marl.zoo import entries, load
-from veca_marl.zoo.command import AddOptions, add, main
+from veca_marl.zoo.command import AddOptions, add, default_task, main
 from veca_marl.zoo.entries import read_entry
 
 QUIET = ("log=csv", "log.video=false", "log.progress_bar=false")
@@ -179,6 +180,20 @@ def test_nothing_in_a_file_is_executed(tmp_path):
     with pytest.raises(CheckpointError, match=r"evil\.safetensors"):
         read_policy(path)
     assert not (tmp_path / "executed").exists()
+
+
+def test_the_frozen_episodes_have_the_default_parameters_of_the_task():
+    """Whatever a run has learnt from."""
+    for words in (
+        ["+task=KickTheBall", "task.max_seconds=0.2", "task.weights.kick=3.0"],
+        ["+task=SitBaby", "task.starts={on_back:0.5,on_belly:0.5,on_all_fours:0,sitting:0}"],
+    ):
+        task = compose(words).task
+        assert default_task(task)
+        assert parameters(compose([*words, *default_task(task)]).task) == parameters(
+            compose(words[:1]).task
+        )
+        assert default_task(compose(words[:1]).task) == []
 
 
 def test_a_policy_that_is_too_large_is_not_written(run, tmp_path, monkeypatch):

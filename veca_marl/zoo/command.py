@@ -2,7 +2,8 @@
 
 ``list`` prints the policies with their returns on the frozen episodes. ``add`` makes a file of a
 run's latest checkpoint: parameters in half precision (safetensors), configuration and provenance,
-at most 2 MB; before that it is played in the 100 frozen episodes of its task, as it is stored.
+at most 2 MB; before that it is played in the 100 frozen episodes of its task, as it is stored and
+with the default parameters of the task.
 """
 
 from __future__ import annotations
@@ -19,12 +20,14 @@ from omegaconf import MISSING
 from veca_marl.algos.checkpoints import CheckpointError, checkpoints_in, read_checkpoint
 from veca_marl.algos.files import WriteError
 from veca_marl.algos.policy_files import write_policy
-from veca_marl.config import ConfigError
+from veca_marl.config import ConfigError, compose
 from veca_marl.config.command_line import CommandLine, check_folder
+from veca_marl.envs.core.benchmark import parameters
+from veca_marl.envs.core.task import TaskCfg
 from veca_marl.evaluate import BENCHMARK, EvaluateOptions, departures, evaluate_run, lines, summary
 from veca_marl.policy_paths import SUFFIX, ZOO
 from veca_marl.registry import unknown
-from veca_marl.runs.run_folder import open_run
+from veca_marl.runs.run_folder import open_run, stored_configuration
 from veca_marl.stored_files import read_json, read_yaml
 from veca_marl.zoo.entries import Entry, entries
 
@@ -87,6 +90,9 @@ def add(options: AddOptions, overrides: Sequence[str] = ()) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_policy(path, content, about)
     try:  # as it is stored: rounding could change an action
+        if options.episodes == BENCHMARK:
+            cfg = stored_configuration(path, overrides, "run=")
+            overrides = [*default_task(cfg.task), *overrides]
         evaluated = evaluate_run(
             EvaluateOptions(run=str(path), episodes=options.episodes), overrides
         )
@@ -101,6 +107,28 @@ def add(options: AddOptions, overrides: Sequence[str] = ()) -> Path:
         }
     write_policy(path, content, about)
     return path
+
+
+def default_task(task: TaskCfg) -> list[str]:
+    """Return the overrides that give a task its own defaults, those of the frozen episodes.
+
+    A run may have learnt from other weights, or in shorter episodes.
+    """
+    own, default = parameters(task), parameters(compose([f"+task={task.name}"]).task)
+    return [
+        f"task.{name}={_text(value)}" for name, value in default.items() if own.get(name) != value
+    ]
+
+
+def _text(value: Any) -> str:
+    """Return a plain value in the grammar of overrides."""
+    if isinstance(value, dict):
+        return "{" + ",".join(f"{key}:{_text(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ",".join(map(_text, value)) + "]"
+    if value is None:
+        return "null"
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _checkpoint(path: Path) -> Path:
