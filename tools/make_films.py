@@ -8,6 +8,7 @@ and the page ``docs/tasks/gallery.md``; the results are committed. Names of task
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -29,7 +30,7 @@ from veca_marl.play.session import EXPERT, Moment, Session, choose
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 LARGEST_BYTES, ALL_BYTES = 1_500_000, 25_000_000
-SHORTEST_S = 6.0
+SHORTEST_S, LONGEST_S = 6.0, 10.0
 WIDTH, HEIGHT = 640, 360
 _OVERSIZED = 1.5  # of what is rendered: smooth edges at half the cost of twice the size
 Image = NDArray[np.uint8]
@@ -74,7 +75,7 @@ def film(task: str, clip: Clip, path: Path) -> None:
         moments = _moments_of(session, clip, view.picture)
         pictures += [_reduced(view.picture()) for _ in moments]
         clip = replace(clip, episode=clip.episode + 1)
-    _write_webm(path, pictures, session.steps_per_s)
+    _write_webm(path, pictures[: round(LONGEST_S * session.steps_per_s)], session.steps_per_s)
     session.close()
 
 
@@ -141,8 +142,9 @@ def _play(session: Session, episode: int) -> Iterator[Moment]:
 
 def _write_webm(path: Path, pictures: list[Image], fps: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".part")
     options = {"crf": "33", "b": "0", "deadline": "good", "cpu-used": "2"}
-    with av.open(str(path), "w", format="webm") as container:
+    with av.open(str(unfinished), "w", format="webm") as container:
         stream = container.add_stream("libvpx-vp9", rate=fps, options=options)
         assert isinstance(stream, av.VideoStream)
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
@@ -151,6 +153,7 @@ def _write_webm(path: Path, pictures: list[Image], fps: int) -> None:
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
+    os.replace(unfinished, path)
 
 
 def main() -> None:
