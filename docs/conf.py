@@ -28,6 +28,7 @@ exclude_patterns = ["_build", "history"]
 default_role = "code"  # docstrings write `name` for code
 
 html_theme = "furo"
+html_static_path = ["_static"]  # the clips of the gallery
 html_title = f"veca_marl {release}"
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]

@@ -75,10 +75,11 @@ def test_mono_gives_equal_channels_and_deaf_none(tmp_path):
     assert len(pictures) == 25
 
 
-def test_a_blind_agent_is_recorded_from_the_room(tmp_path):
+def test_a_blind_agent_is_recorded_without_panels_of_eyes(tmp_path):
     _, seeing, _ = record(tmp_path / "seeing.mp4")
     _, blind, _ = record(tmp_path / "blind.mp4", "senses/vision=blind")
-    assert blind[0].shape[1] < seeing[0].shape[1]
+    assert blind[0].shape == seeing[0].shape == (450, 800, 3)
+    assert (blind[0] != seeing[0]).any()
 
 
 def test_the_last_picture_is_of_the_episode_that_ends(tmp_path):

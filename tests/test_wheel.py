@@ -53,6 +53,14 @@ def test_the_wheel_contains_the_viewer_of_episodes(wheel):
     assert {n.removeprefix(web) for n in names if n.startswith(web)} == expected
 
 
+def test_the_wheel_contains_the_policies_of_the_zoo(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    folder = "veca_marl/zoo/policies/"
+    stored = {n.removeprefix(folder) for n in names if n.startswith(folder)}
+    assert stored == {path.name for path in (ROOT / folder).iterdir()}
+    assert "veca_marl/zoo/command.py" in names
+
+
 PROGRAM = """
 import gymnasium, runpy, sys
 env = gymnasium.make("veca_marl:veca_marl/KickTheBall-v0", senses={"vision": "blind"})

@@ -2,8 +2,9 @@
 
 `make` returns a task for TorchRL, `gym_env` for Gymnasium, `parallel_env` for PettingZoo, `connect`
 one that another machine serves; `train` trains on a task; `save_episode` plays one into a page for
-browsers; `check_task` checks one; `list_tasks` returns the names that they take. They are imported
-at their first use, so that the simulator (`veca_marl.sim`) can be used without loading torch.
+browsers; `check_task` checks one; `list_tasks` returns the names that they take; `zoo` has policies
+that have learnt already. They are imported at their first use, so that the simulator
+(`veca_marl.sim`) can be used without loading torch.
 
 Importing this package registers the Gymnasium ids `veca_marl/<task>-v0`.
 """
@@ -43,6 +44,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import `veca_marl.api` at the first use of one of its functions (PEP 562)."""
+    if name == "zoo":
+        return import_module("veca_marl.zoo")
     if name in __all__:
         return getattr(import_module("veca_marl.api"), name)
     raise AttributeError(f"module 'veca_marl' has no attribute {name!r}; choices: {__all__}")

@@ -255,7 +255,8 @@ def gym_env(
     Args:
         task: One of `list_tasks`.
         seed: Used until `reset` is given one; None is fresh entropy.
-        render_mode: `rgb_array` if `render` is to be called.
+        render_mode: `rgb_array` if `render` is to be called; `human` shows each reset and step in a
+            window (extra ``[play]``).
         layout: `arrays` gives each sense in its own shape, as TorchRL and PettingZoo get it;
             `stacked` gives both eyes as one image `(6, H, W)` and every other sense as a vector,
             as the CNN of Stable-Baselines3 expects; `flat` gives one vector of all senses. In both
@@ -284,7 +285,8 @@ def parallel_env(
     Args:
         task: One of `list_tasks`.
         seed: Used until `reset` is given one; None is fresh entropy.
-        render_mode: `rgb_array` if `render` is to be called.
+        render_mode: `rgb_array` if `render` is to be called; `human` shows each reset and step in a
+            window (extra ``[play]``).
         layout: As for `gym_env`.
         **choices: As for `make`.
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
-from omegaconf import MISSING
 from tensordict.nn import TensorDictSequential
 from torch import nn
 
@@ -32,6 +31,7 @@ from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.benchmark import Benchmark, find_benchmark, parameters
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.policy_paths import policy_path
 from veca_marl.runs.run_folder import stored_actors, stored_configuration
 from veca_marl.sweeps.differences import differences
 
@@ -61,25 +61,43 @@ class EvaluateOptions:
     """Options of the command.
 
     Attributes:
-        run: Folder of a run (its latest checkpoint is used), or a checkpoint in it.
+        run: Folder of a run (its latest checkpoint is used), a checkpoint in it, or zoo/NAME.
+        policy: Another name for `run`, as `play` has it.
         episodes: Number of episodes, or ``benchmark`` for the frozen episodes of the task; the
             parameters of the task and all starts must be those of the benchmark.
         seed: Seed of the episodes; None is 1, or that of the benchmark.
         evaluate: How they are played.
     """
 
-    run: str = MISSING
+    run: str | None = None
+    policy: str | None = None
     episodes: int | str = 32
     seed: int | None = None
     evaluate: EvaluateCfg = field(default_factory=EvaluateCfg)
 
     def __post_init__(self) -> None:
+        if self.run is not None and self.policy is not None:
+            raise ValueError(f"run={self.run} and policy={self.policy} are the same option")
         if isinstance(self.episodes, str):
             self._check_benchmark()
         elif self.episodes < 1:
             raise ValueError(f"episodes must be at least 1, got {self.episodes}")
         if self.seed is not None and self.seed < 0:
             raise ValueError(f"seed must be 0 or more, got {self.seed}")
+
+    def path(self) -> Path:
+        """Return what is evaluated.
+
+        Raises:
+            ConfigError: If none is named, or there is no such policy in the zoo.
+        """
+        named = self.run or self.policy
+        if named is None:
+            raise ConfigError("evaluate needs run=VALUE: a run, a checkpoint, or zoo/NAME")
+        try:
+            return policy_path(named)
+        except ValueError as error:
+            raise ConfigError(f"run={named}: {error}") from error
 
     def _check_benchmark(self) -> None:
         if self.episodes != BENCHMARK:
@@ -117,7 +135,7 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Eva
             benchmark.
         CheckpointError: If the policies do not fit.
     """
-    checkpoint = Path(options.run)
+    checkpoint = options.path()
     cfg = stored_configuration(checkpoint, overrides, "run=")
     exploration = options.evaluate.exploration or cfg.eval.exploration
     benchmark = _checked_benchmark(cfg) if options.episodes == BENCHMARK else None

@@ -13,15 +13,15 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.benchmark import start_state
 from veca_marl.play.command import main
-from veca_marl.play.screen import HEIGHT, WIDTH
 from veca_marl.play.session import Session
 from veca_marl.runs.episode_page import read_page
 
 TASK = ["+task=KickTheBall", "playground=simple", "task.max_seconds=0.4"]
+SMALL = ["play.width=320", "play.height=180", "play.quality=fast"]
 
 
 def play(path, *arguments):
-    return main([*TASK, f"video={path}", *arguments])
+    return main([*TASK, *SMALL, f"video={path}", *arguments])
 
 
 def pictures_and_streams(path):
@@ -36,7 +36,7 @@ def test_two_episodes_of_the_expert(tmp_path, capsys):
     assert play(path, "episodes=2") == 0
     pictures, streams = pictures_and_streams(path)
     assert len(pictures) == 2 * 10, "one picture per step"
-    assert pictures[0].shape == (HEIGHT, WIDTH, 3)
+    assert pictures[0].shape == (180, 320, 3)
     assert streams == ["video", "audio"]
     printed = capsys.readouterr().out
     assert "episode 0: return" in printed
@@ -57,6 +57,9 @@ def test_a_deaf_agent_has_a_video_without_sound(tmp_path):
         (["video=kick.avi"], ("video=kick.avi", ".mp4")),
         (["save=kick.htm"], ("save=kick.htm", ".html")),
         (["save=kick.html"], ("save=kick.html", "video=")),
+        (["play.camera=drone"], ("play.camera", "drone", "orbit")),
+        (["play.agent=nobody"], ("nobody", "agents")),
+        (["play.width=321"], ("width=321", "even")),
     ],
 )
 def test_wrong_options_end_in_one_line(tmp_path, capsys, wrong, parts):

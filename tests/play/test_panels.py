@@ -5,8 +5,7 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core.game import Game
-from veca_marl.play.screen import (
-    BACKGROUND,
+from veca_marl.envs.rendering.panels import (
     GAIN,
     LOSS,
     TermBar,
@@ -34,8 +33,8 @@ def test_each_eye_has_its_image_enlarged():
 
 def test_images_keep_their_ratio():
     left, _ = eye_panels({"vision": np.full((2, 3, 42, 84), 255, np.uint8)}, 320)
-    assert tuple(left[40, 160]) == BACKGROUND
-    assert left[160, 160].tolist() == [255, 255, 255]
+    assert left.shape == (160, 320, 3)
+    assert left[100, 160].tolist() == [255, 255, 255]
 
 
 def test_a_tone_is_a_bright_row_in_the_last_column():
@@ -49,10 +48,12 @@ def test_a_tone_is_a_bright_row_in_the_last_column():
     assert brightness(right)[30:].max() < 100
 
 
-def test_what_is_not_sensed_is_stated():
-    for panel in (*eye_panels({}, 320), *spectrograms([], 25, 160, 320)):
-        assert tuple(panel[4, 4]) == BACKGROUND
-        assert panel.std() > 0, "there is text"
+def test_what_is_not_sensed_has_no_panel(game):
+    assert eye_panels({}, 320) == []
+    assert spectrograms([], 25, 160, 320) == []
+    scene = game.world.scene
+    body = scene.objects[game.actors[0].body.object_id]
+    assert skin_panel(scene, body, {}, 240) is None
 
 
 def test_a_bar_grows_to_the_right_for_a_gain_and_to_the_left_for_a_loss():
@@ -61,7 +62,7 @@ def test_a_bar_grows_to_the_right_for_a_gain_and_to_the_left_for_a_loss():
     )
     gain, loss = (np.argwhere((image == colour).all(axis=2))[:, 1] for colour in (GAIN, LOSS))
     assert gain.min() > loss.max()
-    assert np.ptp(loss) == pytest.approx(2 * np.ptp(gain), abs=2)
+    assert np.ptp(loss) == pytest.approx(2 * np.ptp(gain), abs=4)
 
 
 @pytest.fixture(scope="module")

@@ -13,13 +13,16 @@ from refusals import naming
 from served import gym_env, served, torchrl_env
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.rendering import FilmCfg
 from veca_marl.remote import keys as key_files
 from veca_marl.remote.channel import RemoteError
 from veca_marl.remote.client import RemoteWorlds
 from veca_marl.remote.games import RemoteHost
 from veca_marl.remote.messages import CLOSE, HELLO, MARK, PEER, STEP, Message, decode
+from veca_marl.remote.pictures import fields_of
 
 THOUSAND = 1000
+PICTURE = {"worlds": [0], **fields_of(FilmCfg())}
 
 
 @pytest.fixture(scope="module")
@@ -149,6 +152,9 @@ def test_requests_that_lie(server):
         ("step", {"worlds": [0, 1]}, action),
         ("view", {"worlds": [0, 1]}, b""),
         ("view", {"worlds": [9]}, b""),
+        ("view", {"worlds": [0], "width": 64}, b""),
+        ("view", PICTURE | {"width": 10**6}, b""),
+        ("view", PICTURE | {"camera": "__class__"}, b""),
         ("state", {"worlds": [9]}, b""),
         ("state", {}, b""),
         ("open", {"worlds": 1, "digest": there.cfg.specs.digest}, b""),

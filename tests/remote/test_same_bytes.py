@@ -18,6 +18,7 @@ from torchrl.envs import check_env_specs
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.rendering import CameraKind
 
 
 def same(found, expected):
@@ -110,6 +111,17 @@ def test_pictures_are_the_same(cfg, server):
         there.reset(seed=1)
         here.reset(seed=1)
         np.testing.assert_array_equal(there.render(), here.render())
+
+
+def test_pictures_of_any_choice_are_the_same(cfg, server):
+    choices = {"camera": CameraKind.above, "width": 160, "height": 96, "panels": False}
+    with closing(torchrl_env(server, 1)) as there, closing(VecaEnv(cfg, 1)) as here:
+        for env in (there, here):
+            env.set_seed(1)
+            env.reset()
+        np.testing.assert_array_equal(there.render(**choices), here.render(**choices))
+        with pytest.raises(ValueError, match="1920"):
+            there.render(width=4000)
 
 
 def test_clients_that_play_at_once_have_worlds_of_their_own(cfg, server):

@@ -1,10 +1,14 @@
 """One message per process, only when a kernel of this package is compiled."""
 
+import re
+import sys
+from types import ModuleType
+
 from numba import njit
 from numba.core.event import install_listener
 
 from veca_marl.sim import kernel_cache
-from veca_marl.sim.kernel_cache import CompilationNotice, announce_compilation
+from veca_marl.sim.kernel_cache import CompilationNotice, announce_compilation, kernels_left
 
 
 def compile_new_kernel(module):
@@ -23,6 +27,31 @@ def test_one_line_for_any_number_of_kernels():
         compile_new_kernel("veca_marl.sim.two")
     assert len(told) == 1
     assert "kernels" in told[0]
+
+
+def test_progress_says_how_many_are_done_and_left():
+    told = []
+    with install_listener("numba:compile", CompilationNotice(told.append, every_s=0.0)):
+        compile_new_kernel("veca_marl.sim.one")
+        compile_new_kernel("veca_marl.sim.two")
+    assert len(told) == 3
+    first, second = (re.findall(r"\d+", line) for line in told[1:])
+    assert (first[0], second[0]) == ("1", "2")
+
+
+def test_kernels_that_are_compiled_are_not_left(monkeypatch):
+    def kernel(x):
+        return x + 1
+
+    module = ModuleType("veca_marl.made_up")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    before = kernels_left()
+    module.kernel = njit(kernel)
+    assert kernels_left() == before + 1
+    module.kernel(1)
+    assert kernels_left() == before
+    module.inlined = njit(inline="always")(kernel)
+    assert kernels_left() == before
 
 
 def test_kernels_of_other_packages_are_not_announced():

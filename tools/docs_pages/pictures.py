@@ -16,7 +16,7 @@ from veca_marl.api import make
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.rendering import touch_image
+from veca_marl.envs.rendering import CameraKind, Quality, photograph, touch_image
 from veca_marl.sim.body.walker import Walker
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE
 from veca_marl.sim.vision import Camera, look_at
@@ -78,7 +78,7 @@ def task_picture(task: str, path: Path) -> None:
                 player.body.rest()
             game.advance()
     camera = Camera(640, 400, fov_deg=FOV_DEG)
-    image = camera.render(game.world.scene, [look_at(*viewpoint(game))]).rgb[0]
+    image = photograph(game.world.scene, camera, look_at(*viewpoint(game)), Quality())
     plt.imsave(path, image, pil_kwargs={"optimize": True})
     env.close()
 
@@ -95,7 +95,10 @@ def perception_picture(path: Path) -> None:
         game.step({player.name: np.zeros(2, np.float32)})
         observation = game.observe(player)
     magnitudes = observation["audio"][:2]
-    draw_perception(env.render(), magnitudes, path)
+    eyes = [np.moveaxis(eye, 0, -1) for eye in observation["vision"]]
+    view = env.render(camera=CameraKind.follow, width=560, height=420, panels=False)
+    enlarged = [np.kron(eye, np.ones((5, 5, 1), np.uint8)) for eye in eyes]
+    draw_perception(np.concatenate([*enlarged, view], axis=1), magnitudes, path)
     env.close()
 
 
@@ -105,7 +108,7 @@ def draw_perception(frame: NDArray[np.uint8], audio: NDArray[np.float32], path: 
         2, 1, figsize=(9, 5.4), height_ratios=(2, 1.1), constrained_layout=True
     )
     seen.imshow(frame)
-    seen.set_title("left eye, right eye, and the room from above", fontsize=10)
+    seen.set_title("left eye, right eye, and the agent from behind", fontsize=10)
     seen.axis("off")
     frequency_khz = np.arange(audio.shape[1]) * BIN_HZ / 1000
     heard.plot(frequency_khz, audio[0], label="left ear", lw=1)
@@ -126,8 +129,9 @@ def touch_picture(path: Path) -> None:
     scene, middle = game.world.scene, player.body.position
     camera = Camera(480, 360, fov_deg=34.0)
     beside = look_at(middle + np.array([0.8, 0.9, 0.7]), middle)
+    photo = photograph(scene, camera, beside, Quality())
     readings = game.observe(player)["touch"].reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
     skin = touch_image(scene, scene.objects[player.body.object_id], readings, 360)
-    picture = np.concatenate([camera.render(scene, [beside]).rgb[0], skin], axis=1)
+    picture = np.concatenate([photo, skin], axis=1)
     plt.imsave(path, picture)
     env.close()

@@ -52,7 +52,7 @@ def read_checkpoint(path: Path, device: torch.device) -> dict[str, Any]:
     Raises:
         CheckpointError: If it cannot be read, or is not a checkpoint of this version.
     """
-    return _checked(path, load_file(path, device))
+    return checked_content(path, load_file(path, device))
 
 
 Verify = Callable[[Any], None]
@@ -95,7 +95,7 @@ def map_checkpoint(path: Path) -> tuple[dict[str, Any], Verify]:
             if isinstance(each, torch.Tensor) and not matches(each.untyped_storage()):
                 raise CheckpointError(f"cannot read {path}: {_DAMAGED}")
 
-    return _checked(path, content), verify
+    return checked_content(path, content), verify
 
 
 def load_file(path: Path, device: torch.device) -> Any:
@@ -224,8 +224,12 @@ def _entries(content: Any, most: int) -> Iterator[Any]:
             pending += [(each, depth + 1) for each in entry]
 
 
-def _checked(path: Path, content: Any) -> dict[str, Any]:
-    """Return the content of a file, in the form of this version, if it is a checkpoint of it."""
+def checked_content(path: Path, content: Any) -> dict[str, Any]:
+    """Return the content of a file, in the form of this version, if it is a checkpoint of it.
+
+    Raises:
+        CheckpointError: If it is none.
+    """
     if not isinstance(content, dict) or "format" not in content:
         raise CheckpointError(f"{path} is not a checkpoint of a run")
     if content["format"] != FORMAT:

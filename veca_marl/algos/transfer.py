@@ -26,10 +26,12 @@ from veca_marl.algos.checkpoints import (
 )
 from veca_marl.algos.networks.encoders import for_acting
 from veca_marl.algos.networks.factory import NETWORKS, NetworkCfg
+from veca_marl.algos.policy_files import read_policy
 from veca_marl.algos.sense_encoders import sense_encoders
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.training.finite import check_stored
 from veca_marl.algos.training.learners import TeamLearners
+from veca_marl.policy_paths import SUFFIX, policy_path
 
 
 def load_actor(path: Path, team: str, spec: TeamSpec) -> TensorDictModuleBase:
@@ -142,7 +144,7 @@ def teams_learnt(path: Path) -> list[str]:
     Raises:
         CheckpointError: If there is no such checkpoint.
     """
-    return sorted(map_checkpoint(_file(path))[0]["algorithms"])
+    return sorted(_mapped(_file(path))[0]["algorithms"])
 
 
 def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, _Stored]:
@@ -154,7 +156,7 @@ def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, _Sto
         spec: What its arrays have to be; None for any.
     """
     file = _file(path)
-    content, verify = map_checkpoint(file)
+    content, verify = _mapped(file)
     stored, learnt = content["identity"]["specs"], content["algorithms"]
     if team not in learnt or team not in stored:
         raise CheckpointError(f"{path} has learnt the teams {sorted(learnt)}, not {team!r}")
@@ -211,6 +213,13 @@ def _find_type(base: type, name: str) -> type:
     return NETWORKS.find(name).cfg_type if issubclass(base, NetworkCfg) else base
 
 
+def _mapped(path: Path) -> tuple[dict[str, Any], Verify]:
+    """Return the content of a checkpoint, or of a policy without its run; see `map_checkpoint`."""
+    if path.suffix == SUFFIX:
+        return read_policy(path), lambda entry: None  # verified as a whole
+    return map_checkpoint(path)
+
+
 def _file(path: Path) -> Path:
     if path.is_file():
         return path
@@ -227,8 +236,8 @@ def init_teams(
 ) -> None:
     """Copy parameters of other runs, first those of whole teams, then single encoders.
 
-    A source is the folder of a run or a checkpoint, and ``:TEAM`` where several teams learnt
-    in it and none has the name of the team of this run.
+    A source is the folder of a run, a checkpoint or ``zoo/NAME``, and ``:TEAM`` where several teams
+    learnt in it and none has the name of the team of this run.
 
     Args:
         learners: What starts.
@@ -286,6 +295,6 @@ def _find(source: str, team: str) -> tuple[Path, str]:
 def _split(source: str) -> tuple[Path, str]:
     """Return the path and the name of the team, which is empty if the source names none."""
     if Path(source).exists() or ":" not in source:
-        return Path(source), ""
+        return policy_path(source), ""
     path, _, team = source.rpartition(":")
-    return Path(path), team
+    return policy_path(path), team

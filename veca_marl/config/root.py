@@ -24,6 +24,7 @@ from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.config.overrides import conf_dirs
 from veca_marl.envs.core.game_cfg import GameCfg, Script, TeamCfg
 from veca_marl.envs.core.task import TASKS, TaskCfg
+from veca_marl.policy_paths import policy_path
 from veca_marl.sim.body import BODIES, BodyCfg
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS, ClockCfg, PlaygroundCfg
 from veca_marl.sim.senses import SensesCfg
@@ -185,7 +186,9 @@ class Config:
     def frozen(self) -> dict[str, Path]:
         """Teams with the policy of another run, and its folder or checkpoint."""
         return {
-            team: Path(player) for team, player in self.opponent.items() if player not in _SCRIPTS
+            team: policy_path(player)
+            for team, player in self.opponent.items()
+            if player not in _SCRIPTS
         }
 
 
@@ -193,10 +196,14 @@ _SCRIPTS = tuple(script.value for script in Script)
 
 
 def _check_opponent(team: str, player: str) -> None:
-    if player not in _SCRIPTS and not Path(player).exists():
+    try:
+        path = policy_path(player)
+    except ValueError as error:
+        raise ValueError(f"opponent.{team}={player}: {error}") from error
+    if player not in _SCRIPTS and not path.exists():
         raise ValueError(
-            f"opponent.{team}={player}: choices: {', '.join(_SCRIPTS)}, the folder of a run, "
-            f"a checkpoint (a path that begins in {Path.cwd()}, or an absolute one)"
+            f"opponent.{team}={player}: choices: {', '.join(_SCRIPTS)}, zoo/NAME, the folder of a "
+            f"run, a checkpoint (a path that begins in {Path.cwd()}, or an absolute one)"
         )
 
 

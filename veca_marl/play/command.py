@@ -27,14 +27,17 @@ from veca_marl.algos.evaluation.evaluate import Exploration
 from veca_marl.algos.files import WriteError, write_errors
 from veca_marl.config import ConfigError, one_line
 from veca_marl.config.command_line import CommandLine, check_file
-from veca_marl.play.screen import HEIGHT, WIDTH, Screen
+from veca_marl.envs.rendering.film import FilmCfg, shown_agents
+from veca_marl.play.screen import Screen
 from veca_marl.play.session import EXPERT, KEYBOARD, Choice, Moment, Session, choose
 from veca_marl.play.steering import Keyboard, SteeredPolicy
 from veca_marl.runs.episode_page import EpisodeRecorder, write_page
 from veca_marl.runs.video import SAMPLE_RATE_HZ, VideoFile
 
 
-def film(path: Path, session: Session, episodes: int, title: str) -> list[float]:
+def film(
+    path: Path, session: Session, episodes: int, title: str, cfg: FilmCfg | None = None
+) -> list[float]:
     """Play whole episodes and write them one after another into one MP4 file.
 
     Args:
@@ -42,15 +45,17 @@ def film(path: Path, session: Session, episodes: int, title: str) -> list[float]
         session: What is played.
         episodes: Number of episodes, from episode 0 on.
         title: A line of text in the picture.
+        cfg: How it is shown; None is `FilmCfg()`.
 
     Returns:
         The return of each episode.
     """
-    screen = Screen(session)
+    cfg = cfg or FilmCfg()
+    screen = Screen(session, cfg)
     rate_hz = SAMPLE_RATE_HZ if session.hears else None
     sound: list[NDArray[Any]] = []
     returns = []
-    with VideoFile(path, (HEIGHT, WIDTH), session.steps_per_s, rate_hz) as file:
+    with VideoFile(path, (cfg.height, cfg.width), session.steps_per_s, rate_hz) as file:
         for episode in range(episodes):
             for moment in _moments(session, episode):
                 screen.add(moment)
@@ -98,8 +103,8 @@ _ERRORS = (CheckpointError, WriteError, ModuleNotFoundError)
 
 
 @dataclass
-class PlayCfg:
-    """How a game is played.
+class PlayCfg(FilmCfg):
+    """How a game is played and shown, see `FilmCfg`.
 
     Attributes:
         exploration: Whether policies take the mode of their distribution or a sample; None is as in
@@ -116,8 +121,8 @@ class PlayOptions:
     """Options of the command.
 
     Attributes:
-        policy: What plays: keyboard, expert, random, the folder of a run, or a checkpoint in it.
-            None is the keyboard in a window and the expert in a file.
+        policy: What plays: keyboard, expert, random, zoo/NAME, the folder of a run, or a checkpoint
+            in it. None is the keyboard in a window and the expert in a file.
         video: MP4 file to write; without it and `save` a window opens.
         save: HTML file to write, an episode that any browser opens from disk.
         episodes: Number of episodes; None is one in a file, and any number in a window. A page
@@ -164,7 +169,7 @@ def _film(options: PlayOptions, overrides: list[str], path: Path) -> None:
     policy = options.policy or EXPERT
     session = _session(choose(policy, overrides), options)
     with write_errors(path):
-        returns = film(path, session, options.episodes or 1, f"policy: {policy}")
+        returns = film(path, session, options.episodes or 1, f"policy: {policy}", options.play)
     session.close()
     for episode, total in enumerate(returns):
         print(f"episode {episode}: return {total:.3f}")
@@ -191,7 +196,8 @@ def _play(options: PlayOptions, overrides: list[str]) -> None:
     session = _session(choice, options)
     steers = keyboard if policy == KEYBOARD else None
     try:
-        with window.Window(session, f"policy: {policy}", steers, options.play.sound) as opened:
+        title = f"policy: {policy}"
+        with window.Window(session, title, steers, options.play.sound, options.play) as opened:
             opened.run(options.episodes)
     except window.NoDisplayError as error:
         raise ConfigError(str(error)) from error
@@ -218,7 +224,9 @@ def _import_window() -> ModuleType:
 def _session(choice: Choice, options: PlayOptions) -> Session:
     exploration = options.play.exploration or choice.exploration
     try:
-        return Session(choice.cfg.game, choice.make_policy, options.seed, exploration)
+        session = Session(choice.cfg.game, choice.make_policy, options.seed, exploration)
+        shown_agents(session.game, options.play.agent)
+        return session
     except ValueError as error:
         raise ConfigError(one_line(error)) from error
 

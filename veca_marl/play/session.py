@@ -29,6 +29,7 @@ from veca_marl.envs.core.expert import find_expert
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import SOLVED
+from veca_marl.policy_paths import policy_path
 from veca_marl.runs.assembly import read_specs
 from veca_marl.runs.run_folder import stored_actors, stored_configuration
 
@@ -181,7 +182,8 @@ def choose(policy: str, overrides: Sequence[str], keyboard: PolicyMaker | None =
     """Return what a policy plays.
 
     Args:
-        policy: ``keyboard``, ``expert``, ``random``, the folder of a run, or a checkpoint in it.
+        policy: ``keyboard``, ``expert``, ``random``, ``zoo/NAME``, the folder of a run, or a
+            checkpoint in it.
         overrides: The configuration, such as ``+task=KickTheBall``; of a run, changes of its own.
         keyboard: Returns the policy that is called ``keyboard``; None if there are no keys.
 
@@ -198,10 +200,16 @@ def choose(policy: str, overrides: Sequence[str], keyboard: PolicyMaker | None =
     if policy == RANDOM:
         cfg = compose(overrides)
         return _with_opponents(cfg, lambda env: RandomTeams(env, list(env.group_map)))
-    if not Path(policy).exists():
+    try:
+        path = policy_path(policy)
+    except ValueError as error:
+        raise ConfigError(f"policy={policy}: {error}") from error
+    if not path.exists():
         names = [EXPERT, RANDOM] if keyboard is None else [KEYBOARD, EXPERT, RANDOM]
-        raise ConfigError(f"policy={policy}: choices: {', '.join(names)}, a run, a checkpoint")
-    return _stored(Path(policy), overrides)
+        raise ConfigError(
+            f"policy={policy}: choices: {', '.join(names)}, zoo/NAME, a run, a checkpoint"
+        )
+    return _stored(path, overrides)
 
 
 def _require_expert(cfg: Config) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from veca_marl.play.screen import HEIGHT, WIDTH, Screen
+from veca_marl.envs.rendering.film import FilmCfg, FilmQuality
+from veca_marl.play.screen import Screen
 from veca_marl.play.session import Session
 from veca_marl.play.steering import Keyboard, gaze_point, steerable, steering_help
 from veca_marl.runs.video import SAMPLE_RATE_HZ
@@ -84,9 +86,11 @@ class Window:
         keyboard: Receives the keys that steer the first actor; None if a policy plays it.
         sound: Whether the sound at the ears is played; without a loudspeaker it is not, and a line
             on the screen states that.
+        cfg: What is shown; None is `FilmCfg()`.
 
     Raises:
         NoDisplayError: If there is no screen.
+        ValueError: If there is no such agent.
     """
 
     def __init__(
@@ -95,11 +99,15 @@ class Window:
         title: str,
         keyboard: Keyboard | None = None,
         sound: bool = True,
+        cfg: FilmCfg | None = None,
     ) -> None:
         self._session, self._keyboard = session, keyboard
-        self._surface = _open(title)
+        cfg = cfg or FilmCfg()
+        is_auto = cfg.quality is FilmQuality.auto
+        self._screen = Screen(session, replace(cfg, quality=FilmQuality.fast) if is_auto else cfg)
+        self._size = cfg.width, cfg.height
+        self._surface = _open(title, self._size)
         self._clock = pygame.time.Clock()
-        self._screen = Screen(session)
         steering = [] if keyboard is None else steering_help(steerable(self._body))
         self._lines = [title, *steering, HELP]
         self._loudspeaker = self._open_loudspeaker() if sound and session.hears else None
@@ -165,8 +173,8 @@ class Window:
     def _look(self) -> None:
         """Turn the eyes to where the pointer was with the left button held."""
         if self._keyboard is not None and self._pointer is not None:
-            right = 2.0 * self._pointer[0] / WIDTH - 1.0
-            down = 2.0 * self._pointer[1] / HEIGHT - 1.0
+            right = 2.0 * self._pointer[0] / self._size[0] - 1.0
+            down = 2.0 * self._pointer[1] / self._size[1] - 1.0
             self._body.look_toward_point(gaze_point(self._body, right, down))
 
     def _handle(self, event: pygame.event.Event) -> None:
@@ -210,7 +218,7 @@ class Window:
         pygame.display.flip()
 
 
-def _open(title: str) -> pygame.Surface:
+def _open(title: str, size: tuple[int, int]) -> pygame.Surface:
     """Open the window.
 
     Raises:
@@ -223,7 +231,7 @@ def _open(title: str) -> pygame.Surface:
         if driver in _WITHOUT_SCREEN and os.environ.get("SDL_VIDEODRIVER") != driver:
             raise NoDisplayError("no display; video=FILE.mp4 writes a video instead")
         pygame.display.set_caption(title)
-        return pygame.display.set_mode((WIDTH, HEIGHT))
+        return pygame.display.set_mode(size)
     except pygame.error as error:
         raise NoDisplayError(
             f"no window: {error}; video=FILE.mp4 writes a video instead"

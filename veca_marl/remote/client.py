@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.remote import layouts
+from veca_marl.envs.rendering.film import FilmCfg
+from veca_marl.remote import layouts, pictures
 from veca_marl.remote.address import checked_address
 from veca_marl.remote.channel import Channel, RemoteError
 from veca_marl.remote.description import GameSpecs
@@ -125,9 +126,13 @@ class RemoteWorlds:
             raise RemoteError(f"{self._address}: a state has {len(answer.data)} bytes")
         return np.frombuffer(answer.data, "<f4").astype(np.float32)
 
-    def picture(self, world: int) -> NDArray[np.uint8]:
-        """Return a picture of a world, ``(height, width, 3)``."""
-        answer = self._open.ask(VIEW, {"worlds": [world]})
+    def picture(self, world: int, cfg: FilmCfg) -> NDArray[np.uint8]:
+        """Return a picture of a world, ``(height, width, 3)``.
+
+        Raises:
+            ValueError: If it is larger than a server makes them, or there is no such agent.
+        """
+        answer = self._open.ask(VIEW, {"worlds": [world]} | pictures.fields_of(cfg))
         try:
             lengths = entries(answer.fields, "shape", 3)
             shape = [integer({"shape": one}, "shape", 1, _LARGEST_PICTURE) for one in lengths]

@@ -7,6 +7,7 @@ them, and one message carries those of all worlds that step.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NoReturn, Protocol, cast
 
@@ -17,6 +18,8 @@ from veca_marl.envs.adapters.hosts import Host
 from veca_marl.envs.core.game import Game, Observation, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import Player, TaskCfg, Team
+from veca_marl.envs.rendering.film import FilmCfg
+from veca_marl.envs.rendering.spectator import RENDERED
 from veca_marl.remote import layouts
 from veca_marl.remote.description import GameSpecs, PlayerSpecs
 from veca_marl.remote.layouts import Records
@@ -41,7 +44,7 @@ class Worlds(Protocol):
     def state(self, world: int) -> NDArray[np.float32]:
         """Return the state of a world."""
 
-    def picture(self, world: int) -> NDArray[np.uint8]:
+    def picture(self, world: int, cfg: FilmCfg) -> NDArray[np.uint8]:
         """Return a picture of a world."""
 
     def close(self) -> None:
@@ -309,9 +312,9 @@ class _RemoteView:
     def __init__(self, game: RemoteGame, worlds: Worlds) -> None:
         self._game, self._worlds = game, worlds
 
-    def frame(self, observation: Observation) -> NDArray[np.uint8]:
-        """Return a picture of the present moment; the observation is that of the server."""
-        return self._worlds.picture(self._game.index)
+    def frame(self, **choices: Any) -> NDArray[np.uint8]:
+        """Return a picture of the present moment, see `Spectator.frame`."""
+        return self._worlds.picture(self._game.index, replace(RENDERED, **choices))
 
 
 class RemoteHost(Host):

@@ -21,7 +21,7 @@ from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.rendering import Spectator
 from veca_marl.plugins import load_plugins
 from veca_marl.processes.children import prepare_child
-from veca_marl.remote import layouts
+from veca_marl.remote import layouts, pictures
 from veca_marl.remote.description import GameSpecs
 from veca_marl.remote.lines import FarEnd
 from veca_marl.remote.messages import (
@@ -182,8 +182,7 @@ class WorldServer:
 
     def _view(self, request: Message) -> Message:
         (world,) = self._one(request)
-        game = self._games[world]
-        picture = self._spectators[world].frame(game.observe(game.actors[0]))
+        picture = self._spectators[world].frame(**pictures.choices_of(request.fields))
         fields = {"shape": list(picture.shape)}
         return Message(DONE, request.number, fields, np.ascontiguousarray(picture).tobytes())
 

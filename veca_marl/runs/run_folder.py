@@ -19,6 +19,7 @@ from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
 
 from veca_marl.algos.files import left_behind, write_atomically
+from veca_marl.algos.policy_files import read_policy
 from veca_marl.algos.selfplay import SelfPlayCfg
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.algos.transfer import load_actor
@@ -27,6 +28,7 @@ from veca_marl.config.compose import load_config_plugins
 from veca_marl.config.overrides import plugins_in
 from veca_marl.config.stored import body_names, change, typed
 from veca_marl.migrations import numbered
+from veca_marl.policy_paths import SUFFIX
 from veca_marl.runs.continuation import FILE as PROGRESS_FILE
 from veca_marl.runs.continuation import RunProgress, resume_argument
 from veca_marl.runs.lock import check_links
@@ -340,15 +342,34 @@ def stored_configuration(checkpoint: Path, overrides: Sequence[str], asked_by: s
     Raises:
         ConfigError: If there is no run, or a change is impossible.
     """
-    if checkpoint.is_file() and checkpoint.suffix != ".pt":
+    if checkpoint.is_file() and checkpoint.suffix not in (".pt", SUFFIX):
         raise ConfigError(f"{asked_by}{checkpoint} is no checkpoint; give a run, or a checkpoint")
-    folder = open_run(checkpoint.parent.parent if checkpoint.is_file() else checkpoint, asked_by)
-    node = folder.typed_config(overrides)
+    if checkpoint.suffix == SUFFIX and not checkpoint.is_dir():
+        node = _policy_configuration(checkpoint, overrides)
+    else:
+        named = checkpoint.parent.parent if checkpoint.is_file() else checkpoint
+        node = open_run(named, asked_by).typed_config(overrides)
     # nothing is learnt here
     node.self_play, node.learner, node.init_from, node.init_encoders = SelfPlayCfg(), {}, {}, {}
     node.team_intrinsic = {}
     change(node, overrides)
     return to_config(node)
+
+
+def _policy_configuration(path: Path, overrides: Sequence[str]) -> DictConfig:
+    """Return the configuration in the file of a policy, with the types that it had.
+
+    Raises:
+        CheckpointError: If the file cannot be read.
+        ConfigError: If the configuration has no counterpart in this version.
+    """
+    load_config_plugins(plugins_in(overrides))
+    about = read_policy(path)["about"]
+    try:
+        check_provenance(path, {"bodies": about.get("bodies")})
+        return typed(dict(about["config"]), dict(about["bodies"]))
+    except (StoredFileError, ConfigError, LookupError, TypeError, ValueError) as error:
+        raise ConfigError(f"{path}: {error}") from error
 
 
 def stored_actors(

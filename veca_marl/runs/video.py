@@ -22,12 +22,13 @@ from veca_marl.algos.evaluation.evaluate import ActionPolicy
 from veca_marl.algos.files import new_temporary
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.envs.rendering import Film, FilmCfg, FilmQuality
 from veca_marl.runs.episode_page import EpisodeRecorder, play, write_page
 
 _PEAK = 0.8  # of full scale
 # Codecs and their options; the first that is available is used. The default preset of x264 takes
 # more processor time than the episode itself, this one a fifth of that.
-_VIDEO_CODECS = {"libx264": {"preset": "ultrafast"}, "mpeg4": {}}
+_VIDEO_CODECS = {"libx264": {"preset": "veryfast", "crf": "21"}, "mpeg4": {}}
 
 
 def write_video(
@@ -140,7 +141,8 @@ def _add_pictures(
     assert isinstance(stream, av.VideoStream)
     stream.height, stream.width = shape[:2]
     stream.pix_fmt = "yuv420p"
-    stream.bit_rate = 2_000_000
+    if codec != "libx264":  # which keeps the quality constant instead
+        stream.bit_rate = 4_000_000
     return stream
 
 
@@ -201,6 +203,8 @@ def animated_gif(path: Path, fps: int = 10, scale: float = 0.5) -> bytes:
 
 
 SAMPLE_RATE_HZ = 22_050  # of the ears
+FILM = FilmCfg(width=800, height=450, quality=FilmQuality.good)
+"""The films of training runs."""
 
 
 LONGEST_PAGE_S = 60.0  # of the page that a run leaves: about 3 MB per agent that sees and hears
@@ -231,12 +235,12 @@ def record_episode(
     ):
         episode = play(env, policy)
         next(episode)
-        recorder = EpisodeRecorder(env, LONGEST_PAGE_S)
+        film, recorder = Film(env.games[0], FILM), EpisodeRecorder(env, LONGEST_PAGE_S)
         if page is not None:
             recorder.begin()
         for played in episode:
             seen = _first_player(played["next"], env)
-            frames.append(env.spectators[0].frame(seen))
+            frames.append(film.picture(seen))
             if "waveform" in seen:
                 sound.append(seen["waveform"])
             if page is not None:

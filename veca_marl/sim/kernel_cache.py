@@ -191,6 +191,11 @@ class KernelCache(_Cache):  # type: ignore[misc]
             self.cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
         )
 
+    @property
+    def is_stored(self) -> bool:
+        """Whether the cache has anything of this kernel."""
+        return bool(self._cache_file.is_stored)
+
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Store what was compiled, where there is room, and let waiting processes go on."""
         try:
@@ -215,6 +220,11 @@ class EntryFile(_Files):  # type: ignore[misc]
 
     Each ends with a digest, which numba itself does not read.
     """
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether there is an index."""
+        return os.path.exists(self._index_path)
 
     _turn: int | None = None  # the open file that holds the lock while this process compiles
 
@@ -341,26 +351,79 @@ def _take(file: int) -> bool:
     return True
 
 
+_TOLD_EVERY_S = 10.0
+
+
 class CompilationNotice(Listener):
-    """Writes one line when the first kernel of this package is compiled, not loaded from a cache.
+    """Writes a line when the first kernel of this package is compiled, and then how many are left.
+
+    Kernels that are loaded from the cache are not mentioned.
 
     Args:
-        write: Function that takes the line.
+        write: Function that takes a line.
+        every_s: Time between two lines.
     """
 
-    def __init__(self, write: Callable[[str], object]) -> None:
-        self._write = write
-        self._is_written = False
+    def __init__(self, write: Callable[[str], object], every_s: float = _TOLD_EVERY_S) -> None:
+        self._write, self._every_s = write, every_s
+        self._told_s: float | None = None
+        self._depth, self._done = 0, 0  # kernels that call others compile these meanwhile
+        self._begun_s = 0.0
+        self._taken_s = 0.0
 
     def on_start(self, event: Event) -> None:
         """See `numba.core.event.Listener`."""
-        module: str = event.data["dispatcher"].py_func.__module__
-        if not self._is_written and module.startswith("veca_marl."):
-            self._is_written = True
-            self._write("compiling kernels (once; they are cached) ...")
+        if not _is_ours(event):
+            return
+        if self._depth == 0:
+            self._begun_s = time.process_time()
+        self._depth += 1
+        if self._told_s is None:
+            self._told_s = time.monotonic()
+            self._write(_FIRST_LINE)
 
     def on_end(self, event: Event) -> None:
         """See `numba.core.event.Listener`."""
+        if not _is_ours(event) or self._depth == 0:
+            return
+        self._depth -= 1
+        self._done += 1
+        if self._depth == 0:
+            self._taken_s += time.process_time() - self._begun_s
+        if self._told_s is not None and time.monotonic() - self._told_s >= self._every_s:
+            self._told_s = time.monotonic()
+            running_s = time.process_time() - self._begun_s if self._depth else 0.0
+            self._write(
+                f"compiling kernels: {self._done} done, at most {kernels_left()} left, "
+                f"{self._taken_s + running_s:.0f} s of processor time"
+            )
+
+
+_FIRST_LINE = "compiling kernels (once; they are cached): about a minute of processor time ..."
+
+
+def _is_ours(event: Event) -> bool:
+    module: str = event.data["dispatcher"].py_func.__module__
+    return module.startswith("veca_marl.")
+
+
+def kernels_left() -> int:
+    """Return how many kernels of the imported modules are neither compiled nor in the cache.
+
+    A game needs a part of them only.
+    """
+    modules = [m for name, m in list(sys.modules.items()) if name.startswith("veca_marl.")]
+    named = {id(v): v for module in modules for v in vars(module).values()}
+    kernels = [v for v in named.values() if isinstance(v, dispatcher.Dispatcher)]
+    return sum(not kernel.overloads and not _is_stored(kernel) for kernel in kernels)
+
+
+def _is_stored(kernel: Any) -> bool:
+    """Return whether something is in the cache of a kernel, or nothing ever will be."""
+    if kernel.targetoptions.get("inline") == "always":
+        return True
+    stored: Any = getattr(kernel, "_cache", None)
+    return isinstance(stored, KernelCache) and stored.is_stored
 
 
 @cache

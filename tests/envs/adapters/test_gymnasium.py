@@ -52,6 +52,21 @@ def test_a_picture_shows_the_eyes_and_the_room():
     env.close()
 
 
+def test_human_shows_each_step_in_a_window(monkeypatch):
+    pygame = pytest.importorskip("pygame", reason="the window needs the extra [play]")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = gymnasium.make(ID, render_mode="human")
+    env.reset(seed=0)
+    shown = pygame.surfarray.array3d(pygame.display.get_surface())
+    env.step(env.action_space.sample())
+    assert (pygame.surfarray.array3d(pygame.display.get_surface()) != shown).any()
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    env.step(env.action_space.sample())
+    assert pygame.display.get_surface() is None, "a person has closed it"
+    env.step(env.action_space.sample())
+    env.close()
+
+
 @pytest.mark.parametrize("options", [{"episode": -1}, {"episode": "x"}, 5])
 def test_a_refused_reset_leaves_the_episodes_as_they_are(options):
     refused, other = gym_env("KickTheBall", **CHEAP), gym_env("KickTheBall", **CHEAP)

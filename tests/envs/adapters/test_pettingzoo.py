@@ -115,12 +115,27 @@ def test_a_picture_shows_the_eyes_and_the_room():
         env.render()
     env.reset(seed=0)
     picture = env.render()
-    assert (picture.shape[0], picture.shape[2], picture.dtype) == (252, 3, np.uint8)
+    assert (picture.shape[0], picture.shape[2], picture.dtype) == (360, 3, np.uint8)
     env.step({"agents": np.ones(2, np.float32)})
     assert (env.render() != picture).any()
     assert env.metadata["render_fps"] == 25
     env.close()
     env.close()  # closing twice is harmless
+
+
+def test_human_shows_each_step_in_a_window(monkeypatch):
+    pygame = pytest.importorskip("pygame", reason="the window needs the extra [play]")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = parallel_env("MultiAgentNav", render_mode="human", overrides=["task.max_seconds=1"])
+    env.reset(seed=0)
+    shown = pygame.surfarray.array3d(pygame.display.get_surface())
+    assert shown.shape == (960, 540, 3)
+    assert shown.std() > 10
+    env.step({name: env.action_space(name).sample() for name in env.agents})
+    assert (pygame.surfarray.array3d(pygame.display.get_surface()) != shown).any()
+    assert env.render() is None
+    env.close()
+    assert pygame.display.get_surface() is None
 
 
 def test_render_needs_a_render_mode(env):
@@ -178,7 +193,7 @@ def test_an_unknown_agent_is_an_error_that_lists_the_agents(env, space):
     [
         ("Chess", {}, ("'Chess'", "KickTheBall")),
         ("KickTheBall", {"body": "bird"}, ("'bird'", "walker")),
-        ("KickTheBall", {"render_mode": "human"}, ("render_mode='human'", "rgb_array")),
+        ("KickTheBall", {"render_mode": "film"}, ("render_mode='film'", "human", "rgb_array")),
         ("KickTheBall", {"seed": -1}, ("seed=-1",)),
     ],
 )

@@ -61,3 +61,22 @@ def test_a_primitive_does_not_darken_itself():
         views = Camera().render(scene, [Pose(np.array([0, 0, 2.0]), DOWN)])
         colours.append(views.rgb[0, 42, 42])
     np.testing.assert_array_equal(*colours)
+
+
+def test_things_side_by_side_darken_the_floor_no_more_than_one():
+    """The bones of a hand are one dark thing, not nineteen shadows over each other."""
+    darkest = []
+    for count in (0, 1, 12):
+        scene = Scene()
+        ground = Geom(Shape.BOX, (9, 9, 0.5), colour=(1, 1, 1), offset=(0, 0, -0.5))
+        scene.add_object("floor", [[ground]])
+        for finger in range(count):
+            rod = Geom(Shape.CAPSULE, (0.01, 0.2), offset=(0.005 * finger, 0, 0.1))
+            scene.add_object(f"finger {finger}", [[rod]])
+        scene.update()
+        views = Camera(200, 200).render(scene, [Pose(np.array([0, 0, 2.0]), DOWN)])
+        shown = views.rgb[0, ..., 0].astype(float)
+        darkest.append(shown[views.ids[0] == 0].min())
+    bare, one, many = darkest
+    assert bare > one
+    assert many >= one - 1.0

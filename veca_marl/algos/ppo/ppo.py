@@ -328,6 +328,10 @@ class PPO(Algorithm):
         for name, part in self._parts().items():
             part.load_state_dict(state[name])
 
+    def load_learnt(self, state: dict[str, Any]) -> None:
+        """See `Algorithm`: the network with its value statistics."""
+        self.network.load_state_dict(state["network"])
+
     def _parts(self) -> dict[str, Any]:
         return {
             "network": self.network,

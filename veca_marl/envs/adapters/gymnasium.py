@@ -26,7 +26,8 @@ class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
     Args:
         cfg: What to play.
         seed: Used until `reset` is given one; None is fresh entropy.
-        render_mode: `rgb_array` if `render` is to be called.
+        render_mode: `rgb_array` if `render` is to be called; `human` shows each reset and step in a
+            window.
         layout: Shapes of observations and actions.
         host: Where the game is played.
 
@@ -114,8 +115,8 @@ class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
             self.np_random = self._played.rng
         return self._layout.arrange(observations[self._agent]), self._played.first_info(self._agent)
 
-    def render(self) -> NDArray[np.uint8]:
-        """Return a picture ``(252, width, 3)``: the agent's eyes and skin, and the room."""
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture for people, ``(360, 640, 3)``; None with `render_mode="human"`."""
         return self._played.render()
 
     def close(self) -> None:

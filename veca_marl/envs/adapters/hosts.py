@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.core.game import Game, Observation, Outcome
+from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.rendering import Spectator
@@ -34,8 +34,8 @@ class StateReader(Protocol):
 class View(Protocol):
     """Renders one game for people, see `Spectator`."""
 
-    def frame(self, observation: Observation) -> NDArray[np.uint8]:
-        """Return one video frame ``(252, width, 3)``, from the first actor's observation."""
+    def frame(self, **choices: Any) -> NDArray[np.uint8]:
+        """Return the picture of this moment, ``(height, width, 3)``, see `Spectator.frame`."""
 
 
 class Host(ABC):

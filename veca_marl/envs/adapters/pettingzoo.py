@@ -32,7 +32,8 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
     Args:
         cfg: What to play.
         seed: Used until `reset` is given one; None is fresh entropy.
-        render_mode: `rgb_array` if `render` is to be called.
+        render_mode: `rgb_array` if `render` is to be called; `human` shows each reset and step in a
+            window.
         layout: Shapes of observations and actions.
         host: Where the game is played.
     """
@@ -148,8 +149,8 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
     def _arranged(self, observations: Mapping[str, Observation]) -> dict[str, Observed]:
         return {name: self._layout.arrange(one) for name, one in observations.items()}
 
-    def render(self) -> NDArray[np.uint8]:
-        """Return a picture ``(252, width, 3)``: the first agent's eyes and skin, and the room."""
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture for people, ``(360, 640, 3)``; None with `render_mode="human"`."""
         return self._played.render()
 
     def close(self) -> None:

@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.adapters.hosts import HERE, Host
+from veca_marl.envs.adapters.human_window import HumanWindow
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Observation, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.snapshot import Snapshot, Snapshots, restore
 from veca_marl.envs.core.task import SOLVED
+from veca_marl.envs.rendering import FilmQuality
 
-RENDER_MODES = ("rgb_array",)
+HUMAN = "human"
+RENDER_MODES = (HUMAN, "rgb_array")
 
 
 class Step(NamedTuple):
@@ -79,10 +82,12 @@ class SeededGame:
     Args:
         cfg: What to play.
         seed: As for `VecaEnv`; None is fresh entropy.
-        render_mode: `rgb_array` if `render` is to be called.
+        render_mode: `rgb_array` if `render` is to be called; `human` shows each reset and step in a
+            window.
         host: Where the game is played.
 
     Raises:
+        ModuleNotFoundError: If a window is wanted, without the extra ``[play]``.
         ValueError: If there is no such render mode, or the seed is negative.
     """
 
@@ -92,6 +97,9 @@ class SeededGame:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode={render_mode!r}; choices: {[None, *RENDER_MODES]}")
         self._episodes = Episodes(seed)
+        self._window: HumanWindow | None = None
+        if render_mode == HUMAN:
+            self._window = HumanWindow(cfg.task.name, cfg.clock.control_rate_hz)
         (self.game,) = host.make(cfg, 1)
         self.names = [player.name for player in self.game.actors]
         self._snapshots: Snapshots | None = None
@@ -129,6 +137,7 @@ class SeededGame:
         self._episodes = episodes
         self.game.reset(rng)
         self._running = True
+        self._show()
         return self._observe(self.names)
 
     @property
@@ -192,6 +201,7 @@ class SeededGame:
         names = self.playing
         outcome = self.game.step(actions)
         self._running = not outcome.done
+        self._show()
         return Step(
             self._observe(names),
             {name: float(self.game.reward_of(outcome.terms[name])) for name in names},
@@ -232,8 +242,11 @@ class SeededGame:
             if player.name in names
         }
 
-    def render(self) -> NDArray[np.uint8]:
-        """Return what the first player perceives beside the room, ``(252, width, 3)`` uint8.
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture of the game for people, ``(360, 640, 3)`` uint8.
+
+        Returns:
+            The picture; None with `render_mode="human"`, where a window shows it.
 
         Raises:
             RuntimeError: If the environment was made without `render_mode`, not yet reset, or is
@@ -244,9 +257,19 @@ class SeededGame:
             raise RuntimeError(f"made without a render_mode; choices: {list(RENDER_MODES)}")
         if self.rng is None:
             raise RuntimeError("no episode has begun: call reset() before render()")
-        return self._view.frame(self.game.observe(self.game.actors[0]))
+        if self._window is not None:  # it shows this moment already
+            return None
+        return self._view.frame()
+
+    def _show(self) -> None:
+        """Show this moment in the window, if there is one."""
+        if self._window is not None and not self._window.is_closed:
+            # a window has to keep the speed of the clock
+            self._window.show(self._view.frame(width=960, height=540, quality=FilmQuality.fast))
 
     def close(self) -> None:
         """Release the resources of the world."""
         self._running, self._closed = False, True
+        if self._window is not None:
+            self._window.close()
         self.game.close()

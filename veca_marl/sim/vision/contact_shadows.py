@@ -1,9 +1,10 @@
 """Soft contact shadows of primitives on the floor.
 
-A floor point is darkened by its distance to nearby primitives, as in ambient occlusion by distance
-fields (Evans, "Fast approximations for global illumination on dynamic scenes", SIGGRAPH 2006
-course). The distances are exact. All visible points in the plane z = 0 count as floor; primitives
-larger than furniture cast no shadow.
+A floor point is darkened by its distance to the nearest primitive, as in ambient occlusion by
+distance fields (Evans, "Fast approximations for global illumination on dynamic scenes", SIGGRAPH
+2006 course): the field of several primitives is the least of their distances, so that the nineteen
+bones of a hand darken the floor as one thing does. The distances are exact. All visible points in
+the plane z = 0 count as floor; primitives larger than furniture cast no shadow.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from veca_marl.sim.vision.rasterizer import (
     pixel_rectangle,
 )
 
-# slopes, depths, surfaces and lights of one row
+# slopes, depths, surfaces and nearness of one row
 Pixels: TypeAlias = tuple[Depths, Depths, Surfaces, NDArray[np.float32]]
 
 REACH_M = 0.12  # greatest distance at which a primitive darkens a floor point
@@ -70,6 +71,7 @@ def darken_contact_shadows(
         surfaces: ``(H, W)`` indices of the visible surfaces.
         lights: ``(H, W)`` brightness of each pixel, multiplied in place.
     """
+    nearness = np.zeros_like(lights)
     for g in range(geoms.shapes.shape[0]):
         radius = bounding_radius(geoms.shapes[g], geoms.sizes[g])
         reach, height = radius + REACH_M, geoms.positions[g, 2]
@@ -77,7 +79,10 @@ def darken_contact_shadows(
             continue
         around = math.sqrt(reach * reach - height * height)
         rectangle = _floor_rectangle(geoms.positions[g], around, view, lens)
-        _darken(geoms, g, rectangle, view, lens, depth, surfaces, lights)
+        _approach(geoms, g, rectangle, view, lens, depth, surfaces, nearness)
+    for j in range(lights.shape[0]):
+        for i in range(lights.shape[1]):
+            lights[j, i] *= single(1.0 - DARKNESS * nearness[j, i] * nearness[j, i])
 
 
 @njit(cache=True, error_model="numpy")
@@ -98,7 +103,7 @@ def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) 
 
 
 @njit(cache=True, error_model="numpy")
-def _darken(
+def _approach(
     geoms: GeomTable,
     g: int,
     rectangle: Rectangle,
@@ -106,9 +111,12 @@ def _darken(
     lens: Lens,
     depth: Depths,
     surfaces: Surfaces,
-    lights: NDArray[np.float32],
+    nearness: NDArray[np.float32],
 ) -> None:
-    """Darken the floor pixels of a rectangle by their distance to one primitive."""
+    """Raise the nearness of the floor pixels of a rectangle to that of one primitive.
+
+    It is 1 where they touch and 0 from `REACH_M` on.
+    """
     first, end, top, bottom = rectangle
     columns = lens.columns[first:end]
     shape, size = geoms.shapes[g], _vector(geoms.sizes[g])
@@ -116,18 +124,18 @@ def _darken(
     frame = _vector(geoms.positions[g]), _vector(turn[0]), _vector(turn[1]), _vector(turn[2])
     eye = _vector(view[0]), _vector(view[1]), _vector(view[2]), _vector(view[3])
     for j in range(top, bottom):
-        pixels = columns, depth[j, first:end], surfaces[j, first:end], lights[j, first:end]
+        pixels = columns, depth[j, first:end], surfaces[j, first:end], nearness[j, first:end]
         # a constant shape per call keeps the loops free of branches
         if shape == _SPHERE:
-            _darken_row(_SPHERE, size, frame, eye, lens.rows[j], g, pixels)
+            _approach_row(_SPHERE, size, frame, eye, lens.rows[j], g, pixels)
         elif shape == _BOX:
-            _darken_row(_BOX, size, frame, eye, lens.rows[j], g, pixels)
+            _approach_row(_BOX, size, frame, eye, lens.rows[j], g, pixels)
         elif shape == _CYLINDER:
-            _darken_row(_CYLINDER, size, frame, eye, lens.rows[j], g, pixels)
+            _approach_row(_CYLINDER, size, frame, eye, lens.rows[j], g, pixels)
         elif shape == _POLYHEDRON:
-            _darken_row_of_faces(geoms.faces, size, frame, eye, lens.rows[j], g, pixels)
+            _approach_row_of_faces(geoms.faces, size, frame, eye, lens.rows[j], g, pixels)
         else:
-            _darken_row(_CAPSULE, size, frame, eye, lens.rows[j], g, pixels)
+            _approach_row(_CAPSULE, size, frame, eye, lens.rows[j], g, pixels)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -160,11 +168,11 @@ def _in_frame(frame: Ray, point: Vector) -> Vector:
 
 
 @njit(cache=True, error_model="numpy")
-def _darken_row_of_faces(
+def _approach_row_of_faces(
     faces: Floats, size: Vector, frame: Ray, eye: Ray, y: float, name: int, pixels: Pixels
 ) -> None:
-    """Darken the floor pixels of a row near a polyhedron, see `_darken_row`."""
-    columns, depth, names, lights = pixels
+    """Raise the nearness of the floor pixels of a row to a polyhedron, see `_approach_row`."""
+    columns, depth, names, nearness = pixels
     for i in range(columns.shape[0]):
         point = _visible_point(eye, columns[i], y, depth[i])
         if abs(point[2]) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name:
@@ -173,12 +181,12 @@ def _darken_row_of_faces(
         gap = limited_distance(faces, size, local[0], local[1], local[2], REACH_M)
         if gap >= REACH_M:
             continue
-        nearness = max(1.0 - max(gap, 0.0) / REACH_M, 0.0)
-        lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
+        near = single(1.0 - max(gap, 0.0) / REACH_M)
+        nearness[i] = max(nearness[i], near)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _darken_row(
+def _approach_row(
     shape: int,
     size: Vector,
     frame: Ray,
@@ -187,14 +195,14 @@ def _darken_row(
     name: int,
     pixels: Pixels,
 ) -> None:
-    """Darken the floor pixels of a row; the frame is a primitive's position and its three axes."""
-    columns, depth, names, lights = pixels
+    """Raise the nearness of a row; the frame is a primitive's position and its three axes."""
+    columns, depth, names, nearness = pixels
     for i in range(columns.shape[0]):
         point = _visible_point(eye, columns[i], y, depth[i])
         local = _in_frame(frame, point)
         gap = distance(shape, size, single(local[0]), single(local[1]), single(local[2]))
         gap = gap if gap > 0.0 else 0.0
-        nearness = 1.0 - gap / REACH_M
+        near = 1.0 - gap / REACH_M
         no_floor = abs(point[2]) > _FLOOR_TOLERANCE_M or names[i] == NO_SURFACE or names[i] == name
-        nearness = 0.0 if no_floor or nearness < 0.0 else nearness
-        lights[i] *= single(1.0 - DARKNESS * nearness * nearness)
+        near = 0.0 if no_floor or near < 0.0 else near
+        nearness[i] = max(nearness[i], single(near))

@@ -447,26 +447,29 @@ class VecaEnv(NotCopied, FastStepEnv):
             raise IndexError(f"worlds={chosen}; there are {count} worlds, from 0 on")
         return chosen
 
-    def render(self, world: int = 0) -> NDArray[np.uint8]:
-        """Return what the first player perceives beside a view of the room.
+    def render(self, world: int = 0, **choices: Any) -> NDArray[np.uint8]:
+        """Return a picture of the game for people, with what an agent perceives beside it.
 
         Args:
             world: Number of the world in this environment.
+            **choices: Fields of `veca_marl.envs.rendering.FilmCfg`, such as
+                ``camera=CameraKind.above``, ``agent="red"``, ``width=1280``, ``panels=False``.
 
         Returns:
-            `(252, width, 3)` uint8, RGB.
+            ``(height, width, 3)`` uint8, RGB; by default 360 x 640.
 
         Raises:
             IndexError: If there is no such world.
             RuntimeError: If the world was never reset, or the environment is closed.
+            TypeError: If there is no such field.
+            ValueError: If a value is impossible.
         """
         refuse_closed(self._worlds_closed)
         if not 0 <= world < len(self.games):
             raise IndexError(f"world={world}; there are {len(self.games)} worlds, from 0 on")
-        game = self.games[world]
-        if not game.has_begun:
+        if not self.games[world].has_begun:
             raise RuntimeError("no episode has begun: call reset() before render()")
-        return self.spectators[world].frame(game.observe(game.actors[0]))
+        return self.spectators[world].frame(**choices)
 
     def close(self, *, raise_if_closed: bool = True) -> None:
         """Close all worlds."""

@@ -10,12 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.core.game import Game, Observation
 from veca_marl.sim.geometry import Floats, Pose, Scene, SceneObject
-from veca_marl.sim.physics.rooms import RoomCfg
 from veca_marl.sim.touch import TAXELS_PER_TRIANGLE, load_taxels, taxel_positions
 from veca_marl.sim.touch.parts import skin_parts
-from veca_marl.sim.vision import Camera, look_at
+from veca_marl.sim.vision import Camera
 
 PALE = (0.86, 0.86, 0.84)
 BACKGROUND = (0.13, 0.14, 0.17)
@@ -131,98 +129,6 @@ def _nearest(
     away = np.linalg.norm(points[:, None] - taxels[triangles], axis=2)
     felt: Floats = readings[triangles, away.argmin(axis=1)]
     return felt
-
-
-class RoomView:
-    """Renders the room in which the first actor is; it never changes the game.
-
-    Args:
-        game: The game to show.
-        width: Width of the images in pixels.
-        height: Height of the images in pixels.
-    """
-
-    def __init__(self, game: Game, width: int, height: int) -> None:
-        self._game = game
-        self._camera = Camera(width, height, fov_deg=60.0)
-
-    def image(self) -> NDArray[np.uint8]:
-        """Return the room from an upper corner, ``(height, width, 3)`` uint8.
-
-        The camera looks at the point halfway between the centre of the floor and the mean position
-        of the players in this room.
-        """
-        room = self._room()
-        low, size = np.array(room.lower_m), np.array(room.size_m)
-        # inside the room, in an upper corner, where no wall hides the players
-        eye = low + size * (0.04, 0.04, 0.92)
-        centre = low + size * (0.5, 0.5, 0.0)
-        positions = [player.body.position for player in self._game.players]
-        here = [position for position in positions if room.distance_m(tuple(position[:2])) == 0.0]
-        target = 0.5 * centre + 0.5 * np.mean(here or [centre], axis=0)
-        views = self._camera.render(self._game.world.scene, [look_at(eye, target)])
-        image: NDArray[np.uint8] = views.rgb[0].copy()
-        return image
-
-    def _room(self) -> RoomCfg:
-        """Return the room nearest to the first actor: the one that it is in, if there is one."""
-        place = tuple(self._game.actors[0].body.position[:2])
-        return min(self._game.cfg.playground.rooms, key=lambda room: room.distance_m(place))
-
-
-FRAME_HEIGHT = 252
-ROOM_WIDTH = 336
-
-
-class Spectator:
-    """Renders frames for videos; it never changes the game.
-
-    Args:
-        game: The game to show.
-    """
-
-    def __init__(self, game: Game) -> None:
-        self._game = game
-        self._view = RoomView(game, ROOM_WIDTH, FRAME_HEIGHT)
-
-    def room(self) -> NDArray[np.uint8]:
-        """Return the room of the first actor, ``(252, 336, 3)`` uint8, see `RoomView`."""
-        return self._view.image()
-
-    def frame(self, observation: Observation) -> NDArray[np.uint8]:
-        """Return one video frame: left eye, right eye, touched skin, room.
-
-        Args:
-            observation: The present observation of the first actor, as from `Game.observe`;
-                senses that are not in it are left out of the frame.
-
-        Returns:
-            ``(252, width, 3)`` uint8, even width.
-        """
-        images = [self.room()]
-        if "touch" in observation:
-            images.insert(0, self._skin(observation["touch"]))
-        if "vision" in observation:
-            images[:0] = eye_images(observation["vision"])
-        return np.concatenate(images, axis=1)
-
-    def _skin(self, touch: NDArray[Any]) -> NDArray[np.uint8]:
-        """Return the body of the first actor, coloured by its touch readings."""
-        scene = self._game.world.scene
-        body = scene.objects[self._game.actors[0].body.object_id]
-        readings = touch.reshape(-1, TAXELS_PER_TRIANGLE).astype(np.float64)
-        return touch_image(scene, body, readings, FRAME_HEIGHT)
-
-
-def eye_images(vision: NDArray[Any]) -> list[NDArray[np.uint8]]:
-    """Enlarge ``(2, 3, H, W)`` uint8 to two images ``(252, width, 3)`` by nearest neighbours."""
-    images: list[NDArray[np.uint8]] = []
-    for eye in vision:
-        image = np.ascontiguousarray(np.moveaxis(eye, 0, -1))
-        width = round(FRAME_HEIGHT * image.shape[1] / image.shape[0] / 2) * 2
-        size = (width, FRAME_HEIGHT)
-        images.append(np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST)))
-    return images
 
 
 BLUE = (40, 90, 255)
