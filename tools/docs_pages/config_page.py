@@ -93,8 +93,9 @@ def sections(cfg_type: type, path: str) -> Iterator[tuple[str, type]]:
 
 def _subclasses(base: type) -> list[type]:
     """Return all subclasses, without those with subclasses that no name chooses."""
-    found = []
-    for child in base.__subclasses__():
+    found: list[type] = []
+    children: list[type] = base.__subclasses__()
+    for child in children:
         own = _subclasses(child)
         found += own if own and getattr(child, "name", None) == "" else [child, *own]
     return found
