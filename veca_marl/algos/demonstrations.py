@@ -40,7 +40,7 @@ END = "end"
 """Key of the flag of rows that hold what follows the last step of an episode."""
 
 STATE, ACTION, OUTCOME = "state", "action", "outcome"
-"""Roles of arrays, which are observations before a step, actions, and what the step gave."""
+"""Roles of arrays (before a step, the action, and what the step gave)."""
 
 _DTYPES = ("uint8", "bool", "int64", "int32", "float32", "float64")
 _NAME = re.compile(r"\w[\w.-]{0,99}")

@@ -73,7 +73,7 @@ class TableOptions:
 
 
 Row = dict[str, dict[str, Any]]
-"""Team to its scores, which are mean return, its interval, fraction solved."""
+"""Team to its scores (mean return, its interval, fraction solved)."""
 
 
 def make_table(options: TableOptions, overrides: Sequence[str]) -> str:

@@ -24,7 +24,8 @@ from veca_marl.algos.specs import ActionLayout, action_key
 LARGEST_ACTION = 0.98
 """Magnitude to which demonstrated numbers are limited.
 
-Those at the ends of [-1, 1] are infinitely far for a normal distribution before tanh."""
+Those at the ends of [-1, 1] are infinitely far for a normal distribution before tanh.
+"""
 
 
 @dataclass(frozen=True)

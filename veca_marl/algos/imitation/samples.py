@@ -15,7 +15,7 @@ from veca_marl.algos.networks.memory import initial_states
 from veca_marl.algos.specs import TeamSpec, action_key
 
 COUNTED = "counted"
-"""Key of ``(..., agents)``, which is True for entries to learn from."""
+"""Key of ``(..., agents)`` bool, True for entries to learn from."""
 
 
 @dataclass(frozen=True)
