@@ -25,7 +25,7 @@ MARK = _NAME + str(PROTOCOL).encode()
 LARGEST_REQUEST_HEADER = 64_000
 """Bytes of the header of a request."""
 LARGEST_ANSWER_HEADER = 1_000_000
-"""Bytes of the header of an answer: that to `hello` has the specs and the configuration."""
+"""Bytes of the header of an answer; that to `hello` has the specs and the configuration."""
 _MOST_ENTRIES = 20_000  # of a list or mapping
 _LARGEST_NUMBER = 2**53
 
@@ -38,14 +38,14 @@ HELLO, OPEN, RESET, STEP, STATE, VIEW, CLOSE = (
     "view",
     "close",
 )
-"""Kinds of requests: the server's specs; worlds; episodes; steps; the state; a picture; the end."""
+"""Kinds of requests, for specs, worlds, episodes, steps, the state, a picture, and the end."""
 REQUESTS = (HELLO, OPEN, RESET, STEP, STATE, VIEW, CLOSE)
 DONE, REFUSED, WORKING, PROBE = "done", "refused", "working", "probe"
-"""Kinds of answers: the result; an error; the request is being worked on; nothing, unasked for."""
+"""Kinds of answers, which are a result, an error, that there is work on it, and nothing."""
 
 ACTION, CALL, ENDED, PEER = "action", "call", "ended", "peer"
-"""Reasons of refusals: an invalid action; a call at the wrong time; worlds that are no longer
-there; a peer that is not served."""
+"""Reasons of refusals, which are an invalid action, a call at the wrong time, worlds that are no
+longer there, and a peer that is not served."""
 
 
 class ProtocolError(ValueError):
