@@ -1,17 +1,20 @@
 """Measure what it costs that worlds are on a server: ``python -m tools.remote_rates``.
 
 A server of this machine, at the loopback, and this process play the same game in turns of a few
-steps. Wall time: a server works while its client waits.
+steps. Wall time, since a server works while its client waits. Where other programs use the cores, a
+process that waits for another one is woken late; the processor time of client, server and worlds
+together does not contain that.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,23 +97,50 @@ def batch(env: Any) -> Player:
 
 
 def in_turns(here: Player, there: Player, steps: int, rounds: int) -> str:
-    """Return a line with the times of a step, what is added, and the ratio of the rates.
+    """Return lines with the times of a step, what is added, and the ratio of the rates.
 
-    A round is some steps of either kind. Of each kind the median is reported, and the lower
-    quartile, which other programs on the same cores disturb less.
+    A round is some steps of either kind. Of wall times the median is reported, and the lower
+    quartile, which other programs on the same cores disturb less; of processor times, in which a
+    round has one, the median.
     """
-    times: tuple[list[float], list[float]] = ([], [])
+    walls: tuple[list[float], list[float]] = ([], [])
+    works: tuple[list[float], list[float]] = ([], [])
     for number in range(rounds + 1):
-        for play, found in zip((here, there), times, strict=True):
+        for play, wall, work in zip((here, there), walls, works, strict=True):
+            before = _processor_s()
             seconds = [_seconds(play) for _ in range(steps)]
-            found += seconds if number else []  # the first round warms up
-    quartiles = [1e3 * np.percentile(found, (25, 50)) for found in times]
-    parts = [
-        f"{name} {own:.2f} ms here, {other:.2f} ms on the server: {other - own:+.2f} ms, "
-        f"rate {own / other:.3f} of that here"
-        for name, own, other in zip(("lower quartile", "median"), *quartiles, strict=True)
+            if number:  # the first round warms up
+                wall += seconds
+                work.append((_processor_s() - before) / steps)
+    columns = {
+        "wall time, lower quartile": [np.percentile(one, 25) for one in walls],
+        "wall time, median": [np.percentile(one, 50) for one in walls],
+        "processor time, median": [np.percentile(one, 50) for one in works],
+    }
+    lines = [
+        f"  {name}: {1e3 * own:.2f} ms here, {1e3 * other:.2f} ms on the server, "
+        f"{1e3 * (other - own):+.2f} ms; rate {own / other:.3f} of that here"
+        for name, (own, other) in columns.items()
     ]
-    return "; ".join(parts)
+    return "\n".join(["", *lines])
+
+
+def _processor_s() -> float:
+    """Return the processor time that this process and all it has started have used (Linux)."""
+    nanoseconds = 0
+    for process in [os.getpid(), *_descendants(os.getpid())]:
+        for path in Path(f"/proc/{process}/task").glob("*/schedstat"):
+            with suppress(OSError):  # it has ended
+                nanoseconds += int(path.read_text().split()[0])
+    return 1e-9 * nanoseconds
+
+
+def _descendants(process: int) -> list[int]:
+    with suppress(OSError):
+        texts = [p.read_text() for p in Path(f"/proc/{process}/task").glob("*/children")]
+        own = [int(child) for text in texts for child in text.split()]
+        return own + [one for child in own for one in _descendants(child)]
+    return []
 
 
 def _seconds(play: Player) -> float:

@@ -3,6 +3,7 @@
 import pytest
 from commands import train
 from composed import compose
+from refusals import naming
 from served import served
 
 from veca_marl.config import ConfigError
@@ -55,7 +56,7 @@ def test_a_run_learns_the_same_on_a_server(described, tmp_path):
 
 def test_a_server_with_another_game_is_refused(described):
     other = compose([*GAME[:-1], "task.max_seconds=2.0"]).game
-    with pytest.raises(ConfigError, match=r"max_seconds"):
+    with pytest.raises(ConfigError, match=naming("max_seconds: 0.8", "max_seconds: 2.0")):
         ServedGames(described.address).check(other, 2)
 
 

@@ -7,7 +7,6 @@ loses nothing.
 
 from __future__ import annotations
 
-import math
 import secrets
 import time
 from contextlib import suppress
@@ -31,7 +30,7 @@ from veca_marl.remote.messages import (
 )
 
 RESEND_S = 1.0
-_LOOK_S = 0.1  # at what happens to a new connection
+_LOOK_MS = 100  # between looks at what happens to a new connection
 _LINGER_MS = 500
 _HEARTBEAT_MS, _SILENT_MS = 5_000, 20_000
 _REFUSALS = (
@@ -70,6 +69,7 @@ class Channel:
             (zmq.ROUTING_ID, b"c" + secrets.token_bytes(16)),
             (zmq.LINGER, _LINGER_MS),
             (zmq.MAXMSGSIZE, max(largest, LARGEST_ANSWER_HEADER)),
+            (zmq.RCVTIMEO, round(1000 * RESEND_S)),
             (zmq.IPV6, 1),
             (zmq.HEARTBEAT_IVL, _HEARTBEAT_MS),
             (zmq.HEARTBEAT_TIMEOUT, _SILENT_MS),
@@ -106,12 +106,14 @@ class Channel:
 
     def _answer(self, until: float) -> Message | None:
         """Return what the server answers to the present request; None if it has not by then."""
-        while (left := until - time.monotonic()) > 0.0:
+        while time.monotonic() < until:
             self._note_events()
-            seconds = left if self._monitor is None else min(left, _LOOK_S)
-            if not self._socket.poll(math.ceil(1000 * seconds)):
+            if self._monitor is not None and not self._socket.poll(_LOOK_MS):
                 continue
-            frames = self._socket.recv_multipart(copy=False)
+            try:
+                frames = self._socket.recv_multipart(copy=False)
+            except zmq.Again:
+                continue
             try:
                 message = decode([frame.buffer for frame in frames], LARGEST_ANSWER_HEADER)
             except ProtocolError as error:

@@ -19,7 +19,7 @@ Records = NDArray[np.void]
 Columns = dict[str, NDArray[Any]]
 
 ENDED = "ended"
-"""Field ``(2,)`` with two flags, terminated and truncated."""
+"""Field ``(2,)`` with two flags, whether the episode has ended by the rules, and by its time."""
 STATE = "state"
 OBSERVED, ELIMINATED, SOLVED = "observed", "eliminated", "solved"
 """Fields with a flag for each player."""

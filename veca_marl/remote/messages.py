@@ -41,13 +41,11 @@ HELLO, OPEN, RESET, STEP, STATE, VIEW, CLOSE = (
 """Kinds of requests, for specs, worlds, episodes, steps, the state, a picture, and the end."""
 REQUESTS = (HELLO, OPEN, RESET, STEP, STATE, VIEW, CLOSE)
 DONE, REFUSED, WORKING, PROBE = "done", "refused", "working", "probe"
-"""Kinds of answers. `PROBE` is sent without a request."""
+"""Kinds of answers, which are a result, an error, that there is work on it, and nothing."""
 
 ACTION, CALL, ENDED, PEER = "action", "call", "ended", "peer"
-"""Reasons of refusals.
-
-An invalid action; a call at the wrong time; worlds that are no longer there; a peer that is not
-served."""
+"""Reasons of refusals, which are an invalid action, a call at the wrong time, worlds that are no
+longer there, and a peer that is not served."""
 
 
 class ProtocolError(ValueError):

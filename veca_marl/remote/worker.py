@@ -75,6 +75,7 @@ class WorldServer:
         self._type = layouts.outcome_type(self._specs)
         self._actions = layouts.ActionLayout(self._specs.players)
         self._fields = layouts.outcome_fields(self._specs)
+        self._blocks: dict[int, tuple[layouts.Records, layouts.Columns]] = {}
         self._states = [GlobalState(game) for game in self._games]
         self._spectators = [Spectator(game) for game in self._games]
         self._answers: dict[str, Callable[[Message], Message]] = {
@@ -108,14 +109,25 @@ class WorldServer:
             raise ProtocolError(f"worlds={shown(worlds)} are none, or some twice")
         return worlds
 
+    def _block(self, worlds: int) -> tuple[layouts.Records, layouts.Columns]:
+        """Return records of some worlds, and their fields; those of the last answer, if it fits.
+
+        New memory costs as much as the copies into it.
+        """
+        if worlds not in self._blocks:
+            records = np.zeros(worlds, self._type)
+            self._blocks = {worlds: (records, layouts.columns(records))}
+        elif self._specs.eliminates:  # players that were eliminated before are not written
+            self._blocks[worlds][0].view(np.uint8).fill(0)
+        return self._blocks[worlds]
+
     def _reset(self, request: Message) -> Message:
         worlds = self._worlds(request)
         seeds = entries(request.fields, "seeds", len(worlds))
         if len(seeds) != len(worlds):
             raise ProtocolError(f"{len(seeds)} seeds for {len(worlds)} worlds")
         generators = [_generator(seed) for seed in seeds]
-        records = np.zeros(len(worlds), self._type)
-        columns = layouts.columns(records)
+        records, columns = self._block(len(worlds))
         for row, (world, rng) in enumerate(zip(worlds, generators, strict=True)):
             self._games[world].reset(rng)
             self._write(columns, row, world, frozenset())
@@ -128,8 +140,7 @@ class WorldServer:
         actions = layouts.columns(layouts.records(request.data, record, len(worlds)))
         for row, world in enumerate(worlds):
             self._command(world, actions, row)
-        records = np.zeros(len(worlds), self._type)
-        columns = layouts.columns(records)
+        records, columns = self._block(len(worlds))
         for row, world in enumerate(worlds):
             game = self._games[world]
             eliminated = game.eliminated
