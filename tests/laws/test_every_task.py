@@ -15,6 +15,7 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game, random_action
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.envs.core.task import SOLVED, TASKS
+from veca_marl.sim.physics.bullet_state import saved_state, solving_order
 
 # a walker, a joint-level body with hands, walkers with voices in a house, verbs and doors;
 # `test_every_start.py` compares the starts of every task with those of another process
@@ -48,6 +49,21 @@ def test_data_are_finite_and_in_their_specs(env, rollout):
 def test_the_same_seed_gives_the_same_bytes_in_a_used_env(env, rollout):
     play(env, 10, seed=99)
     assert digest(play(env, rollout.shape[1], seed=1)) == digest(rollout)
+
+
+def test_bullet_solves_contacts_in_the_same_order_in_every_episode(cfg):
+    """Filters of collisions that were set in one episode would change it in those after it."""
+    game = Game(cfg)
+    orders = []
+    for episode in range(3):
+        game.reset(Episodes(episode).next())
+        orders.append(solving_order(saved_state(game.world.client)))
+        for player in game.actors:
+            player.body.rest()
+        for _ in range(3):
+            game.advance()
+    game.close()
+    assert orders[0] == orders[1] == orders[2]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.object_states import BuiltObjects, Capture
 from veca_marl.envs.core.snapshot import Snapshot, SnapshotError, Snapshots, restore
+from veca_marl.sim.physics.bullet_state import saved_state, solving_order
 
 TASK = "BabyzumasRevenge"
 
@@ -89,6 +90,20 @@ def test_a_held_thing_is_held_again(begun, snapshots):
     check_it_continues(begun, snapshots, release)
     assert body.held is toy
     assert toy.holder == body.name
+
+
+def test_what_was_held_in_an_episode_does_not_change_later_ones(begun):
+    def played():
+        begun.reset(np.random.default_rng(3))
+        return solving_order(saved_state(begun.world.client)), let_pass(begun, 30)
+
+    first = played()
+    body, toy = begun.players[0].body, light(begun)
+    assert body.grab(toy)
+    let_pass(begun, 3)
+    assert body.release()
+    let_pass(begun, 3)
+    assert played() == first
 
 
 def test_what_was_free_is_free_again(begun, snapshots):

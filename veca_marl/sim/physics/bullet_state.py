@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import struct
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -71,6 +71,26 @@ def sleeping_bodies(client: BulletClient, state: bytes) -> frozenset[int]:
     return frozenset(client.getBodyUniqueId(number) for number in asleep)
 
 
+def solving_order(state: bytes) -> list[tuple[int, int]]:
+    """Return the bodies and links of a saved state in the order in which contacts are solved.
+
+    Equal episodes need equal orders. Bodies are numbered in the order of their creation.
+    """
+    colliders = list(_colliders(state))
+    return [colliders[index][1:3] for index in _order(colliders)]
+
+
+def solve_in_order(client: BulletClient, order: Sequence[tuple[int, int]]) -> None:
+    """Let Bullet solve contacts in an order of `solving_order`; present contacts may get lost."""
+    state = saved_state(client)
+    if solving_order(state) == list(order):
+        return
+    colliders = {each[1:3]: each for each in _colliders(state)}
+    for body, link in order:  # each gets the next number
+        _, _, _, group, mask, _, _ = colliders[body, link]
+        client.setCollisionFilterGroupMask(client.getBodyUniqueId(body), link, group, mask)
+
+
 def restore_state(client: BulletClient, state: bytes) -> None:
     """Return to a state of `saved_state`, of this or of another client with the same bodies.
 
@@ -81,9 +101,7 @@ def restore_state(client: BulletClient, state: bytes) -> None:
     if [each[1:3] for each in saved] != [each[1:3] for each in present]:
         raise pybullet.error("the saved state has other bodies")
     if _order(saved) != _order(present):
-        for each in sorted(saved, key=lambda one: one.number):  # each gets the next number
-            body_id = client.getBodyUniqueId(each.body)
-            client.setCollisionFilterGroupMask(body_id, each.link, each.group, each.mask)
+        solve_in_order(client, solving_order(state))
         present = list(_colliders(saved_state(client)))
     renamed = bytearray(state)
     for before, now in zip(saved, present, strict=True):

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.physics.bullet import BuiltContacts
 from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
-from veca_marl.sim.physics.bullet_state import restore_state, saved_state, sleeping_bodies
+from veca_marl.sim.physics.bullet_state import (
+    restore_state,
+    saved_state,
+    sleeping_bodies,
+    solve_in_order,
+    solving_order,
+)
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.impact_sounds import ImpactSounds
 from veca_marl.sim.physics.interactions import check_interactions
@@ -207,6 +213,7 @@ class World:
         self.step_count = 0
         self.broken_props: list[str] = []
         self._state: int | None = None
+        self._order: list[tuple[int, int]] = []
         self._contacts: BuiltContacts
         self._built: BuiltState | None = None
         self._moving: list[Prop] = []
@@ -285,11 +292,16 @@ class World:
         """
         self._check_not_frozen("freeze it again")
         check_keys(self.props)
+        # bodies set filters of collisions when they meet new things, and these change the order in
+        # which Bullet solves contacts: none may be left for the first episode
+        for mover in self.movers:
+            mover.reset()
         self._set_contact_share()
         self.client.performCollisionDetection()
         self._contacts = BuiltContacts(self.client, self.floor_id)
         with self._contacts.forgotten():
             self._state = self.client.saveState()
+        self._order = solving_order(saved_state(self.client))
         self._built = built_state(self.scene, self.sound.sources)
         for joint in self._joints:
             joint.save()
@@ -312,6 +324,7 @@ class World:
         self._set_contact_share()
         if self._sleep.wake_all():
             self._simulate()
+        solve_in_order(self.client, self._order)  # filters of the last episode have changed it
         with self._contacts.forgotten():
             self.client.restoreState(self._state)
         self._built.restore(self.scene)
