@@ -62,7 +62,9 @@ def tables(results: dict[str, dict]) -> str:
     """Return the table of the results: all data sets, and what the qualities cost."""
     head = "| data set | quality | samples, epochs, runs | scores on the test set | paper |"
     lines = [
-        "<!-- written by experiments/datasets/measure.py -->",
+        "# Scores of the baselines",
+        "",
+        "Written by measure.py.",
         "",
         head,
         "|---|---|---|---|---|",
