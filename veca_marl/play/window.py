@@ -229,6 +229,7 @@ def _open(title: str, size: tuple[int, int]) -> pygame.Surface:
         driver = pygame.display.get_driver()
         # without a screen SDL falls back to a driver that shows nothing
         if driver in _WITHOUT_SCREEN and os.environ.get("SDL_VIDEODRIVER") != driver:
+            pygame.display.quit()  # another driver may be chosen later
             raise NoDisplayError("no display; video=FILE.mp4 writes a video instead")
         pygame.display.set_caption(title)
         return pygame.display.set_mode(size)

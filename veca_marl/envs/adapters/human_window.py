@@ -57,6 +57,7 @@ class HumanWindow:
             driver = pygame.display.get_driver()
             # without a screen SDL falls back to a driver that shows nothing
             if driver in _WITHOUT_SCREEN and os.environ.get("SDL_VIDEODRIVER") != driver:
+                pygame.display.quit()  # another driver may be chosen later
                 raise RuntimeError(f"no display; {_INSTEAD}")
             pygame.display.set_caption(self._title)
             return pygame.display.set_mode((width, height))

@@ -26,7 +26,7 @@ class CameraKind(Enum):
         follow: Stays behind the agent and above its head, and turns with it.
         orbit: Turns slowly round the agents.
         room: Stays in an upper corner of the room, and turns and zooms to the agents.
-        above: Looks down on the whole room.
+        above: Looks down on the room.
         eyes: Is between the eyes of the agent.
     """
 
@@ -154,9 +154,14 @@ class CameraOperator:
             up = np.array([1.0, 0.0, 0.0])
         tall, wide = (size[1], size[0]) if turned else (size[0], size[1])
         fov_deg = 40.0
-        half = max(tall, wide / self._aspect) / 2.0 * 1.08
-        height = size[2] + half / math.tan(math.radians(fov_deg) / 2.0)
-        eye = np.array([low[0] + size[0] / 2.0, low[1] + size[1] / 2.0, low[2] + height])
+        # in a large room the agent is followed, up to the walls
+        half = min(max(tall, wide / self._aspect) / 2.0 * 1.08, _ABOVE_M)
+        halves = half * (np.array([self._aspect, 1.0]) if turned else np.array([1.0, self._aspect]))
+        middle, reach = low[:2] + size[:2] / 2.0, np.maximum(size[:2] / 2.0 - 0.9 * halves, 0.0)
+        place = self._smooth("place", self._players[0].body.position[:2])
+        middle += np.clip(place - middle, -reach, reach)
+        height = 0.6 + half / math.tan(math.radians(fov_deg) / 2.0)
+        eye = np.array([*middle, low[2] + height])
         forward = -_UP
         return Shot(Pose(eye, np.stack([forward, np.cross(up, forward), up], axis=1)), fov_deg)
 
@@ -219,7 +224,7 @@ class CameraOperator:
         return min(rooms, key=lambda room: room.distance_m((float(place[0]), float(place[1]))))
 
 
-_NEAR_M, _CLEAR_M = 1.2, 0.12
+_NEAR_M, _CLEAR_M, _ABOVE_M = 1.2, 0.12, 1.9
 
 
 def _chosen(game: Game, names: Sequence[str]) -> CameraKind:
