@@ -13,7 +13,7 @@ import torch
 from tensordict import TensorDictBase
 
 import veca_marl
-from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.extend import VecaEnv
 
 TASK, ACTION, REWARD = "KickTheBall", ("agents", "action"), ("agents", "reward")
 AHEAD, TAKEN = 25, 5  # steps of a plan, and steps that are played before the next search

@@ -80,7 +80,8 @@ def test_gymnasium_takes_games_of_one_agent(cfg, one_agent):
             VecaGymEnv(cfg)
 
 
-def test_gymnasium_accepts_it(kind, one_agent, request):
+def test_gymnasium_accepts_it(kind, one_agent, request, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # it tries each render mode
     if kind != "own" or not one_agent:
         pytest.skip("an id has the task's own body, and its task one agent")
     with warnings.catch_warnings():  # sounds and proprioception have no bounds
