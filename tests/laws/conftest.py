@@ -23,6 +23,7 @@ ON_A_SERVER = ("KickTheBall", "PushOut1v1", "MultiAgentNav")
 NARROW = {
     "test_every_adapter": WITH_EVERY_ADAPTER,
     "test_every_adapter_remotely": ON_A_SERVER,
+    "test_every_snapshot": WITH_EVERY_ADAPTER,
     "test_every_task_robustly": WITH_EVERY_ADAPTER,
     "test_every_task_with_bodies": WITH_EVERY_ADAPTER,
 }

@@ -75,7 +75,10 @@ print(digest(continued(env, env.restore(Snapshot.load(path)))))
 """
 
 
-@pytest.mark.parametrize("one", ["KickTheBall", "GrabObject", "BabyzumasRevenge"])
+SLOW = [pytest.param(one, marks=pytest.mark.slow) for one in ("GrabObject", "BabyzumasRevenge")]
+
+
+@pytest.mark.parametrize("one", ["KickTheBall", *SLOW])
 def test_a_stored_snapshot_continues_in_another_process(one, tmp_path):
     env = VecaEnv(game_cfg(one, "own", "task.max_seconds=0.4"), 1, seed=0)
     state = begun(env)

@@ -52,6 +52,7 @@ def test_a_connection_that_breaks_and_comes_back_changes_no_byte(cfg, server):
             assert found == digest(play(here, 30, seed=2))
 
 
+@pytest.mark.slow
 def test_worlds_whose_client_does_not_come_back_are_ended(cfg):
     with served(cfg, 1, clients=1, reconnect_s=0.5) as server:
         env = torchrl_env(server, 1)
