@@ -83,7 +83,7 @@ def game(screen, tmp_path):
         assert time.monotonic() - begun < PATIENCE_S
         time.sleep(0.2)
     screen.press("windowfocus", "--sync", window.split()[0])
-    until(lambda: screen.picture()[:320, 640:960].std() > 10.0)
+    until(lambda: screen.picture()[:230, 820:1050].std() > 10.0)
     yield running
     running.kill()
     running.wait(10)
@@ -98,7 +98,7 @@ def until(condition):
 
 def left_eye(screen):
     """The panel of the left eye; its title is left out."""
-    return screen.picture()[30:320, 640:960].astype(int)
+    return screen.picture()[30:230, 820:1050].astype(int)
 
 
 def still(screen):
