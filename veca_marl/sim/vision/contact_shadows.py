@@ -71,7 +71,7 @@ def darken_contact_shadows(
         surfaces: ``(H, W)`` indices of the visible surfaces.
         lights: ``(H, W)`` brightness of each pixel, multiplied in place.
     """
-    nearness = np.zeros_like(lights)
+    nearness, any_near = np.zeros_like(lights), False
     for g in range(geoms.shapes.shape[0]):
         radius = bounding_radius(geoms.shapes[g], geoms.sizes[g])
         reach, height = radius + REACH_M, geoms.positions[g, 2]
@@ -79,7 +79,11 @@ def darken_contact_shadows(
             continue
         around = math.sqrt(reach * reach - height * height)
         rectangle = _floor_rectangle(geoms.positions[g], around, view, lens)
+        first, end, top, bottom = rectangle
+        any_near |= first < end and top < bottom
         _approach(geoms, g, rectangle, view, lens, depth, surfaces, nearness)
+    if not any_near:
+        return
     for j in range(lights.shape[0]):
         for i in range(lights.shape[1]):
             lights[j, i] *= single(1.0 - DARKNESS * nearness[j, i] * nearness[j, i])
