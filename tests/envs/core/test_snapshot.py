@@ -253,6 +253,42 @@ def _wrong_kinds(structure):
     structure["made"] = [["nonsense"] for _ in structure["made"]]
 
 
+def _other_random(structure):
+    state = ["random", ["dict", [["bit_generator", "seed"]]]]
+    structure["made"] = [state if each[0] == "random" else each for each in structure["made"]]
+
+
+def _addresses(structure):
+    view = ["view", ["built", 0], 0, ["|O", [1], [8]], True]
+    structure["made"] = [view for _ in structure["made"]]
+
+
+def _property(structure):
+    structure["made"] = [["method", ["built", 0], "weights"] for _ in structure["made"]]
+
+
+def _negative_episode(structure):
+    structure["episodes"] = [0, 0, -1]
+
+
+def _other_random(structure):
+    state = ["random", ["dict", [["bit_generator", "seed"]]]]
+    structure["made"] = [state if each[0] == "random" else each for each in structure["made"]]
+
+
+def _addresses(structure):
+    view = ["view", ["built", 0], 0, ["|O", [1], [8]], True]
+    structure["made"] = [view for _ in structure["made"]]
+
+
+def _property(structure):
+    structure["made"] = [["method", ["built", 0], "weights"] for _ in structure["made"]]
+
+
+def _negative_episode(structure):
+    structure["episodes"] = [0, 0, -1]
+
+
 def _no_digest(structure):
     del structure["digest"]
 
@@ -260,7 +296,7 @@ def _no_digest(structure):
 @pytest.mark.parametrize(
     "change",
     [_no_made, _other_format, _foreign_class, _foreign_function, _numbers_beyond, _wrong_kinds,
-     _no_digest],
+     _no_digest, _other_random, _addresses, _property, _negative_episode],
 )  # fmt: skip
 def test_altered_files_are_refused_in_one_line(begun, snapshots, tmp_path, change):
     taken(begun, snapshots).save(tmp_path / "a.veca")

@@ -141,6 +141,30 @@ class ReplayCfg:
                 f"replay.warm_up_frames={self.warm_up_frames}"
             )
 
+    def check_batch(self, frames: int) -> None:
+        """Check that it takes a batch of frames and the ends of its episodes.
+
+        Raises:
+            ValueError: If it does not.
+        """
+        if self.capacity < 2 * frames:
+            raise ValueError(
+                f"algo.replay.capacity={self.capacity} must be at least twice the {frames} frames "
+                "of a batch"
+            )
+
+    def check_budget(self, frames: int) -> None:
+        """Check that the frames of the warm-up precede the end of a run.
+
+        Raises:
+            ValueError: If they do not.
+        """
+        if frames < self.warm_up_frames:
+            raise ValueError(
+                f"the {frames} frames end before the first update, which needs "
+                f"algo.replay.warm_up_frames={self.warm_up_frames}"
+            )
+
 
 @dataclass
 class SACCfg(AlgorithmCfg):
@@ -237,17 +261,8 @@ class SACCfg(AlgorithmCfg):
 
     def check_batch(self, worlds: int, steps: int) -> None:
         """See `AlgorithmCfg`: the replay buffer takes a batch and the ends of its episodes."""
-        frames = worlds * steps
-        if self.replay.capacity < 2 * frames:
-            raise ValueError(
-                f"algo.replay.capacity={self.replay.capacity} must be at least twice the "
-                f"{frames} frames of a batch"
-            )
+        self.replay.check_batch(worlds * steps)
 
     def check_budget(self, frames: int) -> None:
         """See `AlgorithmCfg`: the frames of the warm-up precede the first update."""
-        if frames < self.replay.warm_up_frames:
-            raise ValueError(
-                f"the {frames} frames end before the first update, which needs "
-                f"algo.replay.warm_up_frames={self.replay.warm_up_frames}"
-            )
+        self.replay.check_budget(frames)

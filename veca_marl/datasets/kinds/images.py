@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -109,10 +110,11 @@ class ToyImages(Dataset):
         """Name of the field of the images: that of the sense if both eyes are stored."""
         return "vision" if self.both_eyes else "image"
 
+    @abstractmethod
     def labels(self, vision: VisionCfg) -> dict[str, Field]:
         """Return the fields beside the images."""
-        raise NotImplementedError
 
+    @abstractmethod
     def read(self, scene: ToyScene, views: Views, middle: Pose) -> Sample:
         """Return the arrays of `labels`.
 
@@ -121,7 +123,6 @@ class ToyImages(Dataset):
             views: The images of the open eyes.
             middle: Pose between the eyes.
         """
-        raise NotImplementedError
 
     def draw(self, rng: np.random.Generator) -> Sample:
         """See `Dataset`."""

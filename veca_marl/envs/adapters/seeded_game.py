@@ -16,7 +16,7 @@ from veca_marl.envs.adapters.human_window import HumanWindow
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Observation, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.snapshot import Snapshot, Snapshots, restore
+from veca_marl.envs.core.snapshot import Restoring, Snapshot, Snapshots
 from veca_marl.envs.core.task import SOLVED
 from veca_marl.envs.rendering import FilmQuality
 
@@ -170,8 +170,9 @@ class SeededGame:
             SnapshotError: If it is that of another configuration.
         """
         refuse_closed(self._closed)
-        restore(self.game, snapshot)
-        self._episodes = Episodes.at(snapshot.episodes)
+        restoring = Restoring(self.game, snapshot)
+        restoring.restore()
+        self._episodes = restoring.episodes
         self._running = True
         return self._observe(self.names)
 

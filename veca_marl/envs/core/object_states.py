@@ -268,6 +268,16 @@ def _thawed(state: Value) -> Any:
     return state
 
 
+def _bit_generator(state: Any) -> np.random.BitGenerator:
+    """Return a new bit generator with a state."""
+    kind = getattr(np.random, state["bit_generator"])
+    if not (isinstance(kind, type) and issubclass(kind, np.random.BitGenerator)):
+        raise SnapshotError(f"{state['bit_generator']!r} is no bit generator")
+    generator: np.random.BitGenerator = kind()
+    generator.state = state
+    return generator
+
+
 def _name_of(item: Any) -> str:
     return f"{item.__module__}:{item.__qualname__}"
 
@@ -302,7 +312,7 @@ class Putting:
         self._states, self._built = states, built
         self._made: dict[int, Any] = {}
         packages = {type(each).__module__.partition(".")[0] for each in built.objects}
-        self._packages = packages - {"builtins", "numpy"}
+        self._packages = packages - {"builtins", "collections", "functools", "numpy"}
         try:
             made = [(self._object(number), each) for number, each in enumerate(states.made)]
             present = [(built.objects[number], each) for number, each in states.built.items()]
@@ -339,7 +349,7 @@ class Putting:
             pairs = (map(self._value, pair) for pair in content[1])
             return types.MappingProxyType(dict(pairs))  # type: ignore[arg-type]
         if kind == "method":
-            return getattr(self._value(content[1]), content[2])
+            return self._method(self._value(content[1]), content[2])
         if kind == "array":
             array = content[1].copy()
             array.flags.writeable = content[2]
@@ -347,14 +357,22 @@ class Putting:
         if kind == "view":
             return self._view(content)
         if kind == "random":
-            name = _thawed(content[1])["bit_generator"]
-            return np.random.Generator(getattr(np.random, name)())
+            return np.random.Generator(_bit_generator(_thawed(content[1])))
         if kind == "deque":
             return deque(maxlen=content[1])
         return {"list": list, "dict": dict, "set": set}[kind]()
 
+    def _method(self, owner: Any, name: str) -> Any:
+        """Return a method; what is no method, such as a property, is not called."""
+        function = getattr(type(owner), name)
+        if not isinstance(function, types.FunctionType):
+            raise SnapshotError(f"{type(owner).__name__}.{name} is no method")
+        return types.MethodType(function, owner)
+
     def _view(self, content: Value) -> Any:
         _, base, offset, (dtype, shape, strides), writeable = content
+        if np.dtype(dtype).hasobject:  # its bytes would be taken for addresses
+            raise SnapshotError(f"a view has the dtype {dtype}")
         view = np.ndarray(shape, dtype, self._value(base), offset, strides)
         view.flags.writeable = writeable
         return view
@@ -367,8 +385,9 @@ class Putting:
         if kind == "view":
             return lambda: None
         if kind == "random":
+            _check_kind(item, np.random.Generator)
             state = _thawed(content[1])
-            np.random.Generator(type(item.bit_generator)()).bit_generator.state = state
+            _check_kind(item.bit_generator, type(_bit_generator(state)))
             return lambda: setattr(item.bit_generator, "state", state)
         if kind == "object":
             _check_kind(item, self._class(content[1]))

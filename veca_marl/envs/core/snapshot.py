@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.object_states import (
     BuiltObjects,
@@ -118,28 +119,53 @@ class Snapshots:
         return Snapshot(game.cfg.task.name, _digest(game), states, physics, episodes)
 
 
-def restore(game: Game, snapshot: Snapshot) -> None:
-    """Return a game to the state of a snapshot, which may be of another game or process.
+class Restoring:
+    """A snapshot that was checked against the game that it is to be restored in.
 
     Args:
         game: The game.
-        snapshot: Of a game with an equal configuration and version.
+        snapshot: Of a game with an equal configuration and version, also of another process.
+
+    Attributes:
+        episodes: Those that follow the present one.
 
     Raises:
-        SnapshotError: If it is that of another configuration or version, or damaged.
+        SnapshotError: If it is that of another configuration or version, or damaged. The game is as
+            it was.
     """
-    if snapshot.task != game.cfg.task.name:
-        raise SnapshotError(f"the snapshot is of {snapshot.task}, the game is {game.cfg.task.name}")
-    if snapshot.built != _digest(game):
-        raise SnapshotError(
-            f"the snapshot of {snapshot.task} is of another configuration, or of another version "
-            "of veca_marl or a plug-in: make the environment with the same arguments"
-        )
-    putting = Putting(snapshot.states, game.built)
-    try:
-        game.world.restore_physics(snapshot.physics, putting.put)
-    except pybullet.error as error:
-        raise SnapshotError(f"the snapshot does not fit this game: {error}") from error
+
+    def __init__(self, game: Game, snapshot: Snapshot) -> None:
+        if snapshot.task != game.cfg.task.name:
+            raise SnapshotError(
+                f"the snapshot is of {snapshot.task}, the game is {game.cfg.task.name}"
+            )
+        if snapshot.built != _digest(game):
+            raise SnapshotError(
+                f"the snapshot of {snapshot.task} is of another configuration, or of another "
+                "version of veca_marl or a plug-in: make the environment with the same arguments"
+            )
+        self._world, self._physics = game.world, snapshot.physics
+        self._putting = Putting(snapshot.states, game.built)
+        try:
+            self.episodes = Episodes.at(snapshot.episodes)
+        except ValueError as error:
+            raise SnapshotError(f"the snapshot is damaged: {error}") from error
+
+    def restore(self) -> None:
+        """Return the game to the state of the snapshot.
+
+        Raises:
+            SnapshotError: If Bullet does not take the state of the physics.
+        """
+        try:
+            self._world.restore_physics(self._physics, self._putting.put)
+        except pybullet.error as error:
+            raise SnapshotError(f"the snapshot does not fit this game: {error}") from error
+
+
+def restore(game: Game, snapshot: Snapshot) -> None:
+    """Return a game to the state of a snapshot, see `Restoring`."""
+    Restoring(game, snapshot).restore()
 
 
 def _built(game: Game) -> BuiltObjects:
@@ -221,4 +247,4 @@ def _damage(path: Path) -> Iterator[None]:
         raise SnapshotError(f"{path} is no snapshot, or damaged: {reason}") from error
 
 
-__all__ = ["Snapshot", "SnapshotError", "Snapshots", "restore"]
+__all__ = ["Restoring", "Snapshot", "SnapshotError", "Snapshots", "restore"]

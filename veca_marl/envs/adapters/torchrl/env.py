@@ -17,7 +17,7 @@ from veca_marl.envs.adapters.torchrl.fast_step import Arrays, FastStepEnv, Layou
 from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
 from veca_marl.envs.core.game import ActionSpec, Game, Outcome, from_parts, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
-from veca_marl.envs.core.snapshot import Snapshot, Snapshots, restore
+from veca_marl.envs.core.snapshot import Restoring, Snapshot, Snapshots
 from veca_marl.envs.core.task import SOLVED, Player
 from veca_marl.sim.sense import ArraySpec
 
@@ -429,9 +429,11 @@ class VecaEnv(NotCopied, FastStepEnv):
         each = [snapshots] * len(chosen) if isinstance(snapshots, Snapshot) else list(snapshots)
         if len(each) != len(chosen):
             raise ValueError(f"{len(each)} snapshots for {len(chosen)} worlds {chosen}")
-        for world, snapshot in zip(chosen, each, strict=True):
-            restore(self.games[world], snapshot)
-            self.episodes[world] = Episodes.at(snapshot.episodes)
+        pairs = zip(chosen, each, strict=True)
+        checked = [Restoring(self.games[world], snapshot) for world, snapshot in pairs]
+        for world, restoring in zip(chosen, checked, strict=True):
+            restoring.restore()
+            self.episodes[world] = restoring.episodes
         arrays = self._start.new()
         for world, game in enumerate(self.games):
             if game.has_begun:
