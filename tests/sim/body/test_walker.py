@@ -8,7 +8,7 @@ from refusals import naming
 from walking import ball, empty_world, let_pass, walker_in, wall
 
 from veca_marl.sim.body import MOUNTS
-from veca_marl.sim.body.walker import WalkerCfg
+from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.body.walker.actions import MOVES, WALK_ACTIONS, WalkActionKind
 from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.physics import ClockCfg
@@ -59,6 +59,35 @@ def test_it_walks_in_a_circle():
     assert across == pytest.approx(2.0 * 4.0 / (2.0 * math.pi), rel=0.01)
     let_pass(world, 2.0)
     np.testing.assert_allclose(walker.position[:2], 0.0, atol=1e-6)
+
+
+def walked(is_clear, monkeypatch):
+    """Return a walk by random commands in a room with a wall and a ball, as a list of poses."""
+    monkeypatch.setattr(Walker, "is_clear", property(is_clear))
+    rng = np.random.default_rng(5)
+    world = empty_world(wall(position=(1.0, 0.0, 0.0)), ball(position=(-1.0, 0.0, 0.1)))
+    walker, poses = walker_in(world), []
+    for _ in range(200):
+        walker.walk(rng.uniform(-1.0, 1.0), rng.uniform(-2.0, 2.0))
+        world.step()
+        pose = [*walker.position, walker.yaw_rad, *world.props["ball"].position]
+        capsule = world.client.getBasePositionAndOrientation(walker.body_id)[0]
+        poses.append([*pose, *capsule])
+    return poses
+
+
+def test_a_step_in_the_open_is_that_of_its_physics_steps(monkeypatch):
+    """A walker that can meet nothing walks through an agent step at once, to the same bytes."""
+    free_steps, is_clear = [], Walker.is_clear.fget
+
+    def notice(walker):
+        free_steps.append(is_clear(walker))
+        return free_steps[-1]
+
+    at_once = walked(notice, monkeypatch)
+    by_physics_steps = walked(lambda walker: False, monkeypatch)
+    assert any(free_steps)
+    assert at_once == by_physics_steps
 
 
 def test_full_actions_are_the_configured_speeds():

@@ -50,6 +50,7 @@ from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
 _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes
 _MARGIN_M = 0.06  # an obstacle may displace the capsule by so much within one agent step
+_GAP_M = 0.01  # more than the margins of Bullet's shapes
 _CARPET_M = 0.02  # what is lower is walked over
 _DEPTH_M = 1e-6  # less is rounding
 
@@ -73,6 +74,7 @@ class Capsule:
         support_id: PyBullet's id of the prop on which the walker stands, which is no obstacle; -1
             on the floor.
         walked_over: Likewise of the things that it walks over.
+        is_clear: Whether nothing but other walkers can be met within this agent step.
     """
 
     def __init__(
@@ -106,6 +108,7 @@ class Capsule:
         self._near: list[int] = []
         self._near_leaves: list[Prop] = []
         self._squeezed = False
+        self.is_clear = False
 
     @property
     def footprint(self) -> Footprint:
@@ -120,6 +123,7 @@ class Capsule:
         capsules: Collection[int],
         position: Floats,
         distance_m: float,
+        approach_m: float = 0.0,
     ) -> None:
         """Collect the obstacles that can be reached within this agent step.
 
@@ -129,16 +133,26 @@ class Capsule:
             capsules: PyBullet's ids of the capsules of all walkers.
             position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
             distance_m: The distance that the walker covers without obstacles.
+            approach_m: The distance by which things that move come nearer.
         """
         if (len(props), len(bodies)) != self._known:
             self._find_obstacles(props, bodies)
         self._capsules = capsules
-        reach_m = self._reach_m + _MARGIN_M + distance_m
+        self._squeezed = False
+        reach_m = self._reach_m + _MARGIN_M + distance_m + approach_m
         near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
         self.leave_out(self.walked_over)
         self._near_leaves = self._leaves.near(position, reach_m)
         self._jammed.collect(position, reach_m, self._near_leaves, capsules)
+        free_m = self._reach_m + distance_m + _GAP_M
+        farther = self._obstacles.are_farther(position, free_m)
+        self.is_clear = farther and not self._jammed.are_near
+
+    @property
+    def reach_m(self) -> float:
+        """Distance from its centre to its farthest point, on the floor plan."""
+        return self._reach_m
 
     @property
     def near(self) -> Sequence[int]:

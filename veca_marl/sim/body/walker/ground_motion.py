@@ -24,6 +24,7 @@ from veca_marl.sim.sound.modal_synthesis import (
     bar_modes,
 )
 
+_DISPLACED_M = 0.06  # by moving things within an agent step
 _APPROACH_MPS = 3.0  # obstacles that approach faster may be overlooked within an agent step
 
 
@@ -56,6 +57,7 @@ class GroundMotion:
         self.ground: Floats = np.zeros(2)
         self.velocity: Floats = np.zeros(3)
         self.yaw_rad = self.speed_mps = self.turn_radps = 0.0
+        self._arrival: tuple[float, float, float] | None = None
         self._known = 0
         self._without_joint: dict[int, Prop] = {}
 
@@ -88,7 +90,7 @@ class GroundMotion:
             y: Metres.
             yaw_rad: Heading.
         """
-        self.ground, self.velocity = np.array([x, y]), np.zeros(3)
+        self.ground, self.velocity, self._arrival = np.array([x, y]), np.zeros(3), None
         self.yaw_rad = yaw_rad
         self.speed_mps = self.turn_radps = 0.0
         self._stand_on_floor()
@@ -100,11 +102,44 @@ class GroundMotion:
     def before_step(self) -> None:
         """Collect the obstacles that can be reached within this agent step."""
         self._step_start = self.ground.copy()
-        greatest_mps = abs(self.speed_mps) + _APPROACH_MPS
+        step_s = self._world.clock.step_s
         self.capsule.leave_out(())
-        self._collect_obstacles(greatest_mps * self._world.clock.step_s)
+        self._collect_obstacles(abs(self.speed_mps) * step_s, _APPROACH_MPS * step_s)
         if self._cfg.stride_height_m > 0.0 and self.footing.prop is None:
             self._walk_over_low_things()
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether it walks on the floor, where only other walkers can be met in this agent step."""
+        return self.capsule.is_clear and self.footing.prop is None and not self.footing.low
+
+    @property
+    def swept_circle(self) -> tuple[float, float, float]:
+        """What its capsule can touch in this agent step: centre and radius, metres."""
+        x, y = self.ground.tolist()
+        way_m = abs(self.speed_mps) * self._world.clock.step_s
+        return x, y, self.capsule.reach_m + _DISPLACED_M + way_m
+
+    def walk_freely(self) -> None:
+        """Walk for an agent step in which nothing can be met; it ends with `after_step`.
+
+        Meanwhile Bullet moves the capsule along the chord, in case something is very fast.
+        """
+        clock = self._world.clock
+        start_yaw_rad, (x, y) = self.yaw_rad, self.ground.tolist()
+        for _ in range(clock.substeps):
+            x, y = self._along_arc(x, y, clock.substep_s)
+        self._arrival = x, y, self.yaw_rad
+        self.yaw_rad = start_yaw_rad
+        vx, vy = ((x, y) - self.ground) / clock.step_s
+        self.capsule.set_velocity(float(vx), float(vy), self.turn_radps)
+
+    def _arrive(self, x: float, y: float, yaw_rad: float) -> None:
+        """Stand at the end of the way of an agent step."""
+        self.ground[:], self.yaw_rad = (x, y), yaw_rad
+        self.stance.turn(yaw_rad)
+        self.capsule.move_to(x, y)
+        self._arrival = None
 
     def _walk_over_low_things(self) -> None:
         """Take what is low from the obstacles; the walker stands on it where it is."""
@@ -131,14 +166,18 @@ class GroundMotion:
 
         It is the end of the arc of a circle that constant speeds give, for any duration.
         """
-        half_rad = self.turn_radps * substep_s / 2.0
+        x, y = self._along_arc(*self.ground.tolist(), substep_s)
+        self.stance.turn(self.yaw_rad)
+        return x, y
+
+    def _along_arc(self, x: float, y: float, duration_s: float) -> tuple[float, float]:
+        """Turn; return the end of the way from a position without obstacles, metres."""
+        half_rad = self.turn_radps * duration_s / 2.0
         chord_share = math.sin(half_rad) / half_rad if half_rad else 1.0
-        chord_m = self.speed_mps * substep_s * chord_share
-        x, y = self.ground
+        chord_m = self.speed_mps * duration_s * chord_share
         x += chord_m * math.cos(self.yaw_rad + half_rad)
         y += chord_m * math.sin(self.yaw_rad + half_rad)
         self.yaw_rad += 2.0 * half_rad
-        self.stance.turn(self.yaw_rad)
         return x, y
 
     def resolve_contacts(self, x: float, y: float) -> tuple[float, float]:
@@ -155,7 +194,9 @@ class GroundMotion:
             self._update_surface()
 
     def after_step(self) -> None:
-        """Compute the mean velocity over this agent step."""
+        """End the agent step: arrive, and compute the mean velocity over it."""
+        if self._arrival is not None:
+            self._arrive(*self._arrival)
         self.velocity[:2] = (self.ground - self._step_start) / self._world.clock.step_s
 
     def can_step_on(self, prop: Prop) -> bool:
@@ -221,13 +262,20 @@ class GroundMotion:
         if self.footing.prop is None:
             self.capsule.support_id = -1
 
-    def _collect_obstacles(self, distance_m: float) -> None:
-        """Collect the obstacles within a distance, joint-level bodies and walkers among them."""
+    def _collect_obstacles(self, distance_m: float, approach_m: float = 0.0) -> None:
+        """Collect the obstacles within a distance, joint-level bodies and walkers among them.
+
+        Args:
+            distance_m: That the walker covers.
+            approach_m: By which things that move come nearer.
+        """
         movers = self._world.movers
         bodies = [id_ for mover in movers if isinstance(mover, Body) for id_ in mover.obstacle_ids]
         collisions = (mover for mover in movers if isinstance(mover, WalkerCollisions))
         capsules = [id_ for each in collisions for id_ in each.capsule_ids]
-        self.capsule.collect_obstacles(self._world.props, bodies, capsules, self.ground, distance_m)
+        self.capsule.collect_obstacles(
+            self._world.props, bodies, capsules, self.ground, distance_m, approach_m
+        )
 
 
 _FOOT_MASS_SHARE = 0.06

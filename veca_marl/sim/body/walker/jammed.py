@@ -22,6 +22,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Scene
 from veca_marl.sim.physics import Prop
@@ -177,6 +179,33 @@ class _Backing(NamedTuple):
     depth_m: float
 
 
+@njit(cache=True, error_model="numpy")
+def near_circles(
+    positions: Floats,
+    rows: NDArray[np.int64],
+    radii_m: Floats,
+    position: Floats,
+    reach_m: float,
+) -> NDArray[np.int64]:
+    """Return the numbers of the circles within a distance of a point on the floor plan.
+
+    Args:
+        positions: ``(F, 3)`` metres, of all frames.
+        rows: ``(n,)`` the frames of the circles' centres.
+        radii_m: ``(n,)`` metres.
+        position: ``(2,)`` or ``(3,)`` metres.
+        reach_m: The distance.
+    """
+    found = np.empty(len(rows), np.int64)
+    count = 0
+    for n in range(len(rows)):
+        x, y = positions[rows[n], 0] - position[0], positions[rows[n], 1] - position[1]
+        if math.hypot(x, y) < radii_m[n] + reach_m:
+            found[count] = n
+            count += 1
+    return found[:count]
+
+
 class JammedProps:
     """The light props near a capsule, and which of them cannot move out of its way.
 
@@ -202,7 +231,7 @@ class JammedProps:
         self._client, self._scene, self._capsule_id = client, scene, capsule_id
         self._props = list(props)
         self._light = {prop.body_id: prop for prop in (*props, *leaves)}
-        self._rows = [scene.objects[prop.object_id].rows.start for prop in props]
+        self._rows = np.array([scene.objects[prop.object_id].rows.start for prop in props], int)
         self._extents_m = np.array([prop.extent_m for prop in props])
         self._near: list[Prop] = []
         self._touched: dict[int, Prop] = {}
@@ -227,12 +256,17 @@ class JammedProps:
         """
         self.forget()
         self._capsules = frozenset(capsules)
-        away = self._scene.positions[self._rows, :2] - position[:2]
-        near = np.hypot(away[:, 0], away[:, 1]) < self._extents_m + reach_m
-        self._near = [self._props[number] for number in np.flatnonzero(near).tolist()]
+        circles = self._scene.positions, self._rows, self._extents_m
+        numbers = near_circles(*circles, position, reach_m).tolist()
+        self._near = [self._props[number] for number in numbers]
         self._near += leaves
         for prop in self._near:
             prop.rest.wake()  # a capsule has no mass, so it does not wake what it touches
+
+    @property
+    def are_near(self) -> bool:
+        """Whether there is anything that the last `collect` has found."""
+        return bool(self._near)
 
     def forget(self) -> None:
         """Forget what is behind the things, because they are about to move."""

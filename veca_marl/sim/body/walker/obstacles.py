@@ -48,6 +48,7 @@ class ObstacleBoxes:
         self._low, self._high = np.zeros((2, len(self.ids), 2))
         fixed = [number for number, prop in enumerate(props) if prop.fixed]
         self._fixed, self._moving = fixed, sorted(set(range(len(self.ids))) - set(fixed))
+        self._fixed_numbers, self._numbers = frozenset(fixed), list[int]()
         rows = [scene.objects[props[number].object_id].rows for number in fixed]
         self._frames = np.array([row.start for row in rows], int)
         self._places, self._turns = np.full((len(fixed), 3), np.nan), np.zeros((len(fixed), 3, 3))
@@ -65,7 +66,21 @@ class ObstacleBoxes:
         if follow_frames(*poses, self._places, self._turns):
             self._read(self._fixed)
         numbers = near_boxes(self._low, self._high, self._beyond_m, position, reach_m)
-        return [self.ids[number] for number in numbers.tolist()]
+        self._numbers = numbers.tolist()
+        return [self.ids[number] for number in self._numbers]
+
+    def are_farther(self, position: Floats, reach_m: float) -> bool:
+        """Return whether what `near` has found last is fixed, and farther than a distance.
+
+        Args:
+            position: ``(2,)`` or ``(3,)`` metres; only the horizontal part counts.
+            reach_m: Metres along x or y.
+        """
+        if not self._fixed_numbers.issuperset(self._numbers):
+            return False
+        low, high = self._low[self._numbers], self._high[self._numbers]
+        beyond_m = self._beyond_m[self._numbers]
+        return len(near_boxes(low, high, beyond_m, position, reach_m)) == 0
 
     def _read(self, numbers: Sequence[int]) -> None:
         """Read the boxes of some obstacles from Bullet."""

@@ -344,6 +344,20 @@ class Walker(Body):
         self._motion.before_step()
         self._handling.before_step(self._world.clock.step_s)
 
+    @property
+    def is_clear(self) -> bool:
+        """Whether nothing but other walkers can be met in this agent step."""
+        return self._motion.is_clear and self.held is None
+
+    @property
+    def swept_circle(self) -> tuple[float, float, float]:
+        """What it can touch on the floor plan in this agent step: centre and radius, metres."""
+        return self._motion.swept_circle
+
+    def walk_freely(self) -> None:
+        """Walk for the whole agent step, in which nothing can be met."""
+        self._motion.walk_freely()
+
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn; return the position after this physics step without obstacles, metres."""
         return self._motion.proposed_position(substep_s)

@@ -12,6 +12,7 @@ added first.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -186,6 +187,20 @@ class CollidingWalker(VerbUser, Protocol):
         """PyBullet's ids of the capsules of all stances."""
         ...
 
+    @property
+    def is_clear(self) -> bool:
+        """Whether nothing but other walkers can be met in this agent step."""
+        ...
+
+    @property
+    def swept_circle(self) -> tuple[float, float, float]:
+        """What it can touch on the floor plan in this agent step: centre and radius, metres."""
+        ...
+
+    def walk_freely(self) -> None:
+        """Walk for the whole agent step, in which nothing can be met."""
+        ...
+
     def proposed_position(self, substep_s: float) -> tuple[float, float]:
         """Turn; return the position after this physics step without obstacles, metres."""
         ...
@@ -204,10 +219,15 @@ class CollidingWalker(VerbUser, Protocol):
 
 
 class WalkerCollisions:
-    """Moves all walkers of one world; the world attaches this object instead of each walker."""
+    """Moves all walkers of one world; the world attaches this object instead of each walker.
+
+    A walker that can meet nothing in an agent step walks through all of it at once. The others move
+    by physics steps.
+    """
 
     def __init__(self) -> None:
         self._walkers: list[CollidingWalker] = []
+        self._hindered: list[CollidingWalker] = []
         self._radii: Floats = np.zeros(0)
         self._half_axes, self._positions, self._corrections = np.zeros((3, 0, 2))
 
@@ -233,15 +253,24 @@ class WalkerCollisions:
         apply_verbs(self._walkers)
         for walker in self._walkers:
             walker.before_step()
+        hindered = _meeting(self._walkers)
+        self._hindered = [
+            w for w, is_hindered in zip(self._walkers, hindered, strict=True) if is_hindered
+        ]
+        for walker, is_hindered in zip(self._walkers, hindered, strict=True):
+            if not is_hindered:
+                walker.walk_freely()
 
     def before_substep(self, substep_s: float) -> None:
-        """Move all walkers by one physics step and separate those that overlap."""
-        positions = self._positions
-        for index, walker in enumerate(self._walkers):
+        """Move walkers by one physics step and separate those that overlap."""
+        if not self._hindered:
+            return
+        positions = self._positions[: len(self._hindered)]
+        for index, walker in enumerate(self._hindered):
             positions[index] = walker.resolve_contacts(*walker.proposed_position(substep_s))
-        if len(self._walkers) > 1:
+        if len(self._hindered) > 1:
             self._separate(positions)
-        for (x, y), walker in zip(positions.tolist(), self._walkers, strict=True):
+        for (x, y), walker in zip(positions.tolist(), self._hindered, strict=True):
             walker.set_position(x, y, substep_s)
 
     def after_substep(self, substep_s: float) -> None:
@@ -253,16 +282,18 @@ class WalkerCollisions:
         Args:
             positions: ``(n, 2)`` metres; changed in place.
         """
-        corrections = self._corrections
-        for index, walker in enumerate(self._walkers):
-            self._radii[index], self._half_axes[index] = walker.footprint
+        count = len(positions)
+        radii, half_axes = self._radii[:count], self._half_axes[:count]
+        corrections = self._corrections[:count]
+        for index, walker in enumerate(self._hindered):
+            radii[index], half_axes[index] = walker.footprint
         for _ in range(_ROUNDS):
-            overlap = separate(positions, self._half_axes, self._radii, corrections)
+            overlap = separate(positions, half_axes, radii, corrections)
             if not (self._make_room(corrections) or overlap):
                 break
             for index in np.flatnonzero(corrections.any(axis=1)).tolist():
                 x, y = positions[index] + corrections[index]
-                positions[index] = self._walkers[index].resolve_contacts(float(x), float(y))
+                positions[index] = self._hindered[index].resolve_contacts(float(x), float(y))
 
     def _make_room(self, corrections: Floats) -> bool:
         """Add the displacements that release what walkers press together; return if there are any.
@@ -270,7 +301,7 @@ class WalkerCollisions:
         Args:
             corrections: ``(n, 2)`` metres.
         """
-        rooms = np.array([walker.room_for_others() for walker in self._walkers])
+        rooms = np.array([walker.room_for_others() for walker in self._hindered])
         corrections += rooms
         return bool(rooms.any())
 
@@ -278,6 +309,17 @@ class WalkerCollisions:
         """See `Mover`."""
         for walker in self._walkers:
             walker.write_frames()
+
+
+def _meeting(walkers: Sequence[CollidingWalker]) -> list[bool]:
+    """Return for each walker whether it may meet anything in this agent step."""
+    meeting = [not walker.is_clear for walker in walkers]
+    circles = [walker.swept_circle for walker in walkers] if len(walkers) > 1 else []
+    for one, other in itertools.combinations(range(len(circles)), 2):
+        (x, y, radius_m), (other_x, other_y, other_m) = circles[one], circles[other]
+        if math.hypot(x - other_x, y - other_y) < radius_m + other_m:
+            meeting[one] = meeting[other] = True
+    return meeting
 
 
 def walker_collisions(world: World) -> WalkerCollisions:
