@@ -65,14 +65,12 @@ def walked(is_clear, monkeypatch):
     """Return a walk by random commands in a room with a wall and a ball, as a list of poses."""
     monkeypatch.setattr(Walker, "is_clear", property(is_clear))
     rng = np.random.default_rng(5)
-    world = empty_world(wall(position=(1.0, 0.0, 0.0)), ball(position=(-1.0, 0.0, 0.1)))
+    world = empty_world(wall(position=(0.7, 0.0, 0.0)), ball(position=(-0.5, 0.0, 0.1)))
     walker, poses = walker_in(world), []
     for _ in range(200):
         walker.walk(rng.uniform(-1.0, 1.0), rng.uniform(-2.0, 2.0))
         world.step()
-        pose = [*walker.position, walker.yaw_rad, *world.props["ball"].position]
-        capsule = world.client.getBasePositionAndOrientation(walker.body_id)[0]
-        poses.append([*pose, *capsule])
+        poses.append([*walker.position, walker.yaw_rad, *world.props["ball"].position])
     return poses
 
 
@@ -86,7 +84,7 @@ def test_a_step_in_the_open_is_that_of_its_physics_steps(monkeypatch):
 
     at_once = walked(notice, monkeypatch)
     by_physics_steps = walked(lambda walker: False, monkeypatch)
-    assert any(free_steps)
+    assert any(free_steps) and not all(free_steps)
     assert at_once == by_physics_steps
 
 
