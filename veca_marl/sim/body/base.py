@@ -195,6 +195,11 @@ class Body(ABC):
         """
         self.place((0.0, 0.0, 0.0))
 
+    @property
+    def needs_physics(self) -> bool:
+        """Whether it acts in the physics steps of this agent step, once that is prepared."""
+        return True
+
     def after_substep(self, substep_s: float) -> None:  # noqa: B027  optional
         """Do nothing after a physics step; bodies with simulated joints apply their limits."""
 

@@ -27,6 +27,7 @@ from veca_marl.sim.physics.playground import PlaygroundCfg, make_house
 from veca_marl.sim.physics.props import (
     Prop,
     PropCfg,
+    copy_all_poses,
     follow_physics,
     limit_detection,
     prop_sleep,
@@ -135,6 +136,11 @@ class Mover(Protocol):
 
     def before_step(self) -> None:
         """Prepare an agent step, before its first physics step."""
+
+    @property
+    def needs_physics(self) -> bool:
+        """Whether it acts in the physics steps of this agent step, once that is prepared."""
+        ...
 
     def before_substep(self, substep_s: float) -> None:
         """Move or apply forces, before each physics step of `substep_s` seconds."""
@@ -333,7 +339,7 @@ class World:
             self._impacts.reset()
         for joint in self._joints:
             joint.reset()
-        follow_physics(list(self.props.values()))
+        copy_all_poses(list(self.props.values()))
         for mover in self.movers:
             mover.reset()
 
@@ -383,14 +389,20 @@ class World:
         for mover in self.movers:
             mover.before_step()
         self._sleep.before_step()
-        self._fast.before_step()
-        for _ in range(self.clock.substeps):
-            self._substep()
+        if self._needs_physics():
+            self._fast.before_step()
+            for _ in range(self.clock.substeps):
+                self._substep()
         self._update_scene()
         self._sleep.after_step(self.scene)
         self.sound.advance()
         self.step_count += 1
         self.version += 1
+
+    def _needs_physics(self) -> bool:
+        """Return whether physics steps could change anything in this agent step."""
+        acting = any(mover.needs_physics for mover in self.movers)
+        return acting or bool(self.after_substep) or not self._sleep.all_asleep
 
     def _substep(self) -> None:
         """Advance by one physics step: move, simulate, apply limits, observe."""

@@ -261,6 +261,11 @@ class WalkerCollisions:
             if not is_hindered:
                 walker.walk_freely()
 
+    @property
+    def needs_physics(self) -> bool:
+        """See `Mover`: those that can meet nothing need none."""
+        return bool(self._hindered)
+
     def before_substep(self, substep_s: float) -> None:
         """Move walkers by one physics step and separate those that overlap."""
         if not self._hindered:

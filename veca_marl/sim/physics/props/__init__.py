@@ -2,7 +2,7 @@
 
 from veca_marl.sim.physics.props.joint import JointCfg, JointKind, LockCfg
 from veca_marl.sim.physics.props.planned_prop import PlannedProp, StandingProp
-from veca_marl.sim.physics.props.prop import Prop, follow_physics
+from veca_marl.sim.physics.props.prop import Prop, copy_all_poses, follow_physics
 from veca_marl.sim.physics.props.prop_cfg import (
     SIZE_NAMES,
     PartCfg,
@@ -25,6 +25,7 @@ __all__ = [
     "PropShape",
     "StandingProp",
     "check_appearance",
+    "copy_all_poses",
     "follow_physics",
     "limit_detection",
     "prop_sleep",

@@ -7,6 +7,8 @@ from collections.abc import Collection
 from typing import Protocol
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Scene
 from veca_marl.sim.physics.bullet_client import BulletClient
@@ -23,6 +25,11 @@ class PropSleep(Protocol):
 
     def before_step(self) -> None:
         """Wake all props if gravity has changed since the last agent step."""
+        ...
+
+    @property
+    def all_asleep(self) -> bool:
+        """Whether no prop can move in a physics step unless something else moves it."""
         ...
 
     def before_substep(self) -> None:
@@ -68,8 +75,12 @@ class PropSleep(Protocol):
 class NoSleep:
     """The `PropSleep` of a world in which nothing sleeps."""
 
+    def __init__(self) -> None:
+        self.all_asleep = True  # as long as all props are fixed
+
     def add(self, prop: Prop) -> Rest:
         """Return what does nothing before the prop is moved."""
+        self.all_asleep = self.all_asleep and prop.fixed
         return Awake()
 
     def before_step(self) -> None:
@@ -112,8 +123,9 @@ class RestingProps:
         self._steps = math.ceil(clock.sleep_s / clock.step_s)
         self._rest_m = REST_SPEED * clock.step_s
         self._sleeps: list[Sleep] = []
-        self._rows: list[int] = []
+        self._rows = np.zeros(0, np.int64)
         self._woken: list[Prop] = []
+        self._motionless = False
         self._positions, self._rotations = _unknown_poses(0)
         self._gravity = client.gravity()
 
@@ -122,9 +134,14 @@ class RestingProps:
         if prop.fixed:
             return self
         self._sleeps.append(Sleep(prop, self._client, self._steps, self._woken))
-        self._rows.append(prop.row)
+        self._rows = np.append(self._rows, prop.row)
         self._positions, self._rotations = _unknown_poses(len(self._rows))
         return self._sleeps[-1]
+
+    @property
+    def all_asleep(self) -> bool:
+        """See `PropSleep`."""
+        return self._motionless and not self._woken and all(s.is_allowed for s in self._sleeps)
 
     def wake(self) -> None:
         """Do nothing: the velocity of a fixed prop is not set."""
@@ -143,8 +160,9 @@ class RestingProps:
 
     def before_substep(self) -> None:
         """Note the velocities of props that were woken."""
-        self._kept = [(prop, prop.velocity, prop.angular_velocity) for prop in self._woken]
-        self._woken.clear()
+        if self._woken or self._kept:
+            self._kept = [(prop, prop.velocity, prop.angular_velocity) for prop in self._woken]
+            self._woken.clear()
 
     def after_substep(self) -> None:
         """Give props that were woken before the physics step the velocity that they had.
@@ -163,13 +181,11 @@ class RestingProps:
         Args:
             scene: Where they are at the end of an agent step.
         """
-        positions, rotations = scene.positions[self._rows], scene.rotations[self._rows]
-        moved_m = np.abs(positions - self._positions).max(axis=1)
-        turned_rad = np.abs(rotations - self._rotations).max(axis=(1, 2))
-        still = np.maximum(moved_m, turned_rad) < self._rest_m
-        self._positions, self._rotations = positions, rotations
-        for sleep, is_still in zip(self._sleeps, still.tolist(), strict=True):
-            sleep.count(is_still)
+        frames = scene.positions, scene.rotations, self._rows
+        moved = _follow(*frames, self._positions, self._rotations)
+        self._motionless = not moved.any()
+        for sleep, change in zip(self._sleeps, moved.tolist(), strict=True):
+            sleep.count(change < self._rest_m)
 
     def wake_all(self) -> bool:
         """See `PropSleep`."""
@@ -187,6 +203,36 @@ class RestingProps:
         """See `PropSleep`."""
         for sleep in self._sleeps:
             sleep.fall_asleep()
+
+
+@njit(cache=True)
+def _follow(
+    positions: Floats,
+    rotations: Floats,
+    rows: NDArray[np.int64],
+    last_positions: Floats,
+    last_rotations: Floats,
+) -> Floats:
+    """Copy poses; return the greatest change of a number in each, ``(n,)`` metres or 1.
+
+    Args:
+        positions: ``(F, 3)`` metres, of all frames.
+        rotations: ``(F, 3, 3)``, likewise.
+        rows: ``(n,)`` the frames of the poses.
+        last_positions: ``(n, 3)`` metres, the last copy; updated.
+        last_rotations: ``(n, 3, 3)``, likewise.
+    """
+    changes = np.zeros(len(rows))
+    for n in range(len(rows)):
+        row = rows[n]
+        for i in range(3):
+            changes[n] = max(changes[n], abs(positions[row, i] - last_positions[n, i]))
+            last_positions[n, i] = positions[row, i]
+            for j in range(3):
+                change = abs(rotations[row, i, j] - last_rotations[n, i, j])
+                changes[n] = max(changes[n], change)
+                last_rotations[n, i, j] = rotations[row, i, j]
+    return changes
 
 
 def prop_sleep(client: BulletClient, clock: ClockCfg) -> PropSleep:
