@@ -255,3 +255,12 @@ def test_a_part_of_walls_that_a_playground_lacks_is_refused(part):
         compose(["+task=KickTheBall", f"playground.walls{part}"])
     walled = compose(["+task=KickTheBall", "playground=house", "playground.walls.thickness_m=0.1"])
     assert walled.playground.walls.thickness_m == 0.1
+
+
+def test_what_is_composed_again_has_no_trace_of_what_was_changed():
+    first = compose_node([KICK])
+    first.total_frames, first.task.max_seconds = 5, 1.5
+    compose([KICK]).task.max_seconds = 2.5
+    assert compose_node([KICK]).total_frames == compose([KICK]).total_frames != 5
+    assert compose_node([KICK]).task.max_seconds == compose([KICK]).task.max_seconds
+    assert compose([KICK]).task.max_seconds not in (1.5, 2.5)

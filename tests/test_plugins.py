@@ -1,5 +1,6 @@
 """A package outside this repository adds a task and a preset: by name, and by its entry point."""
 
+import importlib
 import os
 import pickle
 import shutil
@@ -163,6 +164,29 @@ def test_an_installed_plugin_needs_no_naming_and_trains(installed, tmp_path):
     assert done.returncode == 0, done.stderr
     assert float(done.stdout.splitlines()[0]) < 0.6
     assert len((tmp_path / "run" / "metrics.csv").read_text().splitlines()) == 3
+
+
+def test_a_preset_that_changed_is_read_again(outside):
+    write_package(outside, "dim_plugin", "")
+    preset = outside / "dim_plugin" / "conf" / "senses" / "vision" / "dim.yaml"
+    preset.parent.mkdir(parents=True)
+    words = ["plugins=[dim_plugin]", "+task=KickTheBall", "senses/vision=dim"]
+    found = []
+    for blur_deg in (1.0, 12.5):
+        preset.write_text(f"blur_deg: {blur_deg}\n")
+        found.append(compose(words).senses.vision.blur_deg)
+    assert found == [1.0, 12.5]
+
+
+def test_a_plugin_that_is_installed_later_is_found(outside):
+    compose(["+task=KickTheBall"])
+    write_package(outside, "late_plugin", task_text("LateTask"))
+    installed = outside / "late_plugin-1.0.dist-info"
+    installed.mkdir()
+    (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: late_plugin\nVersion: 1.0\n")
+    (installed / "entry_points.txt").write_text("[veca_marl.plugins]\nlate = late_plugin\n")
+    importlib.invalidate_caches()
+    assert compose(["+task=LateTask"]).task.name == "LateTask"
 
 
 def test_a_worker_process_loads_the_plugins_that_a_game_needs(outside):

@@ -12,6 +12,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -65,10 +66,22 @@ def load_plugins(names: Sequence[str] = ()) -> None:
     Raises:
         PluginError: If one cannot be imported, or registers a name that is taken.
     """
-    for entry_point in entry_points(group=GROUP):
+    for entry_point in _entry_points(_state_of_path()):
         _load(_module_of(entry_point), _source_of(entry_point))
     for name in names:
         _load(name, f"plugins=[{name}]")
+
+
+def _state_of_path() -> tuple[tuple[str, int], ...]:
+    """Return the folders in which packages are searched, and when their contents changed."""
+    folders = (Path(entry or ".") for entry in sys.path)
+    return tuple((str(each), each.stat().st_mtime_ns) for each in folders if each.is_dir())
+
+
+@lru_cache(maxsize=1)
+def _entry_points(state: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, ...]:
+    """Return the entry points of installed plug-ins; a search reads hundreds of files."""
+    return tuple(entry_points(group=GROUP))
 
 
 def _module_of(entry_point: EntryPoint) -> str:

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import copy
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
@@ -25,6 +27,7 @@ from veca_marl.config.overrides import (
     check_group_values,
     plugins_in,
     register_search_path,
+    state_of_sources,
 )
 from veca_marl.config.root import Config, register_schemas, store_tasks_without_file
 from veca_marl.envs.core.task import TASKS, find_task
@@ -90,7 +93,7 @@ def compose(overrides: Sequence[str] = ()) -> Config:
     Raises:
         ConfigError: One line that names the wrong part and the choices.
     """
-    return to_config(compose_node(overrides))
+    return to_config(_checked_node(overrides))
 
 
 def compose_node(overrides: Sequence[str]) -> DictConfig:
@@ -99,6 +102,11 @@ def compose_node(overrides: Sequence[str]) -> DictConfig:
     Raises:
         ConfigError: One line that names the wrong part and the choices.
     """
+    return copy.deepcopy(_checked_node(overrides))
+
+
+def _checked_node(overrides: Sequence[str]) -> DictConfig:
+    """Return what `compose_node` returns, to be read only."""
     prepared = prepare(overrides)
     node = _composed(prepared)
     check_arm(node.experiment, prepared)
@@ -128,12 +136,27 @@ def compose_other(root: str, overrides: Sequence[str], loaded: Callable[[], None
 
 
 def _composed(overrides: Sequence[str], root: str = "config") -> DictConfig:
-    """Return what Hydra composes; its errors are one line."""
+    """Return what Hydra composes, to be read only; its errors are one line."""
     try:
-        with _own_hydra():
-            node: DictConfig = hydra.compose(root, overrides=list(overrides))
+        if any(text.lstrip("+~").startswith("hydra") for text in overrides):
+            return _by_hydra(root, tuple(overrides))  # it may name further sources
+        return _composed_once(root, tuple(overrides), state_of_sources())
     except (HydraException, OmegaConfBaseException) as error:
         raise ConfigError(one_line(error)) from error
+
+
+@lru_cache(maxsize=64)
+def _composed_once(root: str, overrides: tuple[str, ...], state: Hashable) -> DictConfig:
+    """Return what Hydra composes; equal words give the same node as long as `state` is equal.
+
+    A composition takes longer than the world that is built from it.
+    """
+    return _by_hydra(root, overrides)
+
+
+def _by_hydra(root: str, overrides: tuple[str, ...]) -> DictConfig:
+    with _own_hydra():
+        node: DictConfig = hydra.compose(root, overrides=list(overrides))
     return node
 
 

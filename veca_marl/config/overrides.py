@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from hydra.core.config_search_path import ConfigSearchPath
+from hydra.core.config_store import ConfigStore
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from hydra.core.plugins import Plugins
@@ -78,6 +81,39 @@ def conf_dirs() -> list[Path]:
     """Return the configuration folders of the project and of the loaded plug-ins."""
     own = [plugin.conf for plugin in PLUGINS.values() if plugin.conf is not None]
     return [conf_dir(), *own]
+
+
+def state_of_sources() -> Hashable:
+    """Return what differs once a configuration file or a stored schema has changed."""
+    files = []
+    for folder in conf_dirs():
+        for where, _, names in os.walk(folder):
+            for name in names:
+                status = os.stat(os.path.join(where, name))
+                files.append((where, name, status.st_mtime_ns, status.st_size))
+    return tuple(files), tuple(_stored_nodes(ConfigStore.instance().repo))
+
+
+class _Identity:
+    """Equals another one of the same object, which it keeps, so that no other object has its id."""
+
+    def __init__(self, of: object) -> None:
+        self._of = of
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Identity) and self._of is other._of
+
+    def __hash__(self) -> int:
+        return id(self._of)
+
+
+def _stored_nodes(group: Mapping[str, Any]) -> Iterator[tuple[str, _Identity]]:
+    """Yield name and identity of each node that is stored with Hydra."""
+    for name, stored in group.items():
+        if isinstance(stored, Mapping):
+            yield from _stored_nodes(stored)
+        else:
+            yield name, _Identity(stored)
 
 
 def check_configuration_files() -> None:

@@ -148,9 +148,13 @@ def capsule_between(start: ArrayLike, end: ArrayLike, radius: float) -> Primitiv
     return Primitive(Shape.CAPSULE, (radius, length), (low + high) / 2.0, turn)
 
 
+_UNIT = np.eye(3)
+_ROUNDING = 1e-6 + 1e-5 * _UNIT
+
+
 def _is_rotation(matrix: NDArray[np.float64]) -> bool:
     """Whether a matrix is 3x3, orthonormal and right-handed."""
-    if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6):
+    if matrix.shape != (3, 3) or not (np.abs(matrix @ matrix.T - _UNIT) <= _ROUNDING).all():
         return False
     return bool(np.linalg.det(matrix) > 0.0)
 
