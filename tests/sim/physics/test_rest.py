@@ -70,6 +70,43 @@ def test_it_sleeps_after_the_time_of_the_clock():
         assert is_simulated(world, "block") is simulated
 
 
+def physics_steps(world, seconds):
+    """Let time pass; return how many physics steps Bullet made."""
+    steps, client = [], world.client
+    simulate, client.stepSimulation = client.stepSimulation, lambda: steps.append(simulate())
+    let_pass(world, seconds)
+    client.stepSimulation = simulate
+    return len(steps)
+
+
+def test_bullet_makes_no_steps_where_nothing_can_move():
+    world = world_of(BLOCK)
+    walker = walker_in(world)
+    walker.walk(-1.0, 0.0)
+    let_sleep(world)
+    let_pass(world, 1.0)  # the block lies down on its edges first
+    assert physics_steps(world, 0.4) == 0
+    walker.place((0.0, 0.0, 0.0))
+    walker.walk(1.0, 0.0)
+    assert physics_steps(world, 2.0) > 0
+    assert world.prop("block").position[0] > 1.2
+
+
+def test_in_a_house_of_fixed_things_a_walk_is_the_same_with_and_without_bullet():
+    films = []
+    for observers in ([], [lambda: None]):  # an observer sees every physics step
+        world = world_of(box("block", (0.4, 0.4, 0.4), 0.0, (0.8, 0.0, 0.2)), clock=ClockCfg())
+        world.after_substep += observers
+        walker = walker_in(world, yaw_deg=20.0)
+        walker.walk(1.0, 0.3)
+        steps = []
+        for _ in range(40):
+            steps.append(physics_steps(world, 0.04))
+            films.append(world.scene.positions.copy())
+        assert (0 in steps) is not bool(observers)
+    assert np.array_equal(films[:40], films[40:])
+
+
 def test_what_moves_is_simulated():
     """A ball at the top of its flight, and one that rolls slowly."""
     thrown = ball("thrown", position=(0.0, 0.0, 0.5))

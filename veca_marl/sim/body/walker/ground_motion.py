@@ -166,7 +166,8 @@ class GroundMotion:
 
         It is the end of the arc of a circle that constant speeds give, for any duration.
         """
-        x, y = self._along_arc(*self.ground.tolist(), substep_s)
+        here_x, here_y = self.ground.tolist()
+        x, y = self._along_arc(here_x, here_y, substep_s)
         self.stance.turn(self.yaw_rad)
         return x, y
 
