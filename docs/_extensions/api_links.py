@@ -1,0 +1,110 @@
+"""Code that names an object of the package leads to its description; search ranks public names.
+
+A guide writes `Task.solved` or `veca_marl.make` as code, which any reader of Markdown shows; in the
+site it is a link as well. In the search, objects that are public (`veca_marl`, `veca_marl.extend`)
+come before those of the inner modules.
+"""
+
+from __future__ import annotations
+
+import builtins
+import re
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.domains.python import PythonDomain
+from sphinx.util.nodes import make_refnode
+
+from tools.docs_pages.api_page import public_names
+
+# `Name`, `Name.member`, `veca_marl.path.name`, with or without arguments
+_CODE = re.compile(r"^(?P<path>[A-Za-z_]\w*(?:\.\w+)*)(?:\(.*\))?$", re.DOTALL)
+_IMPORTANT, _OTHER = 0, 2  # priorities of the search: Sphinx's own is 1
+
+
+@cache
+def _public() -> dict[str, str]:
+    """Return where each public name is defined, `Task` to `veca_marl.envs.core.task.Task`."""
+    return {name: f"{thing.__module__}.{thing.__qualname__}" for name, thing in public_names()}
+
+
+class RankedPythonDomain(PythonDomain):
+    """Python objects, of which the search lists the public ones first."""
+
+    def find_obj(self, env: Any, module: Any, owner: Any, name: str, *rest: Any) -> Any:
+        """See `PythonDomain`: types such as `object` are not attributes of the same name."""
+        if hasattr(builtins, name):
+            return []
+        return super().find_obj(env, module, owner, name, *rest)
+
+    def get_objects(self) -> Iterator[tuple[str, str, str, str, str, int]]:
+        """See `Domain.get_objects`: objects and the priority of each."""
+        public = set(_public().values())
+        for name, shown, kind, page, anchor, priority in super().get_objects():
+            if priority == 1 and kind != "module":
+                owner = name.rpartition(".")[0]
+                rank = _IMPORTANT if name in public or owner in public else _OTHER
+                yield name, shown, kind, page, anchor, rank
+            else:
+                yield name, shown, kind, page, anchor, priority
+
+
+def link_code(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    """Make references of the code in a page that names an object."""
+    domain = app.env.domains["py"]
+    for literal in list(doctree.findall(nodes.literal)):
+        if isinstance(literal.parent, (nodes.reference, nodes.title)):
+            continue
+        target = _target(literal.astext(), domain.objects)
+        if target is None:
+            continue
+        entry = domain.objects[target]
+        if (entry.docname, entry.objtype) == (page, "module"):
+            continue
+        link = make_refnode(app.builder, page, entry.docname, entry.node_id, literal.copy(), target)
+        link[0] += [child.deepcopy() for child in literal.children]
+        literal.replace_self(link)
+
+
+def _target(text: str, objects: Any) -> str | None:
+    """Return the full name of the object that code names; None if it names none."""
+    match = _CODE.match(text)
+    if match is None:
+        return None
+    path = match["path"]
+    if path in objects:
+        return path
+    name, _, member = path.removeprefix("veca_marl.").removeprefix("extend.").partition(".")
+    # `train` and `play` by themselves are commands, `world` is an argument
+    if name not in _public() or (name.islower() and name == path and name in _COMMANDS):
+        return None
+    if not member:
+        return _known(_public()[name], objects)
+    return _member(name, member, objects) or _known(_public()[name], objects)
+
+
+_COMMANDS = ("train", "connect", "terms", "zoo")
+
+
+def _known(target: str, objects: Any) -> str | None:
+    return target if target in objects else None
+
+
+def _member(name: str, member: str, objects: Any) -> str | None:
+    """Return the full name of the member of a public class, where it or a base class defines it."""
+    thing = dict(public_names())[name]
+    for owner in getattr(thing, "__mro__", ()):
+        target = f"{owner.__module__}.{owner.__qualname__}.{member}"
+        if target in objects:
+            return target
+    return None
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Replace the Python domain; link when all objects are known."""
+    app.add_domain(RankedPythonDomain, override=True)
+    app.connect("doctree-resolved", link_code)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
