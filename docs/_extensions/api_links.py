@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import builtins
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
@@ -19,10 +19,10 @@ from sphinx.domains.python import PythonDomain
 from sphinx.util.nodes import make_refnode
 
 from tools.docs_pages.api_page import public_names
+from veca_marl.envs.core.task import TASKS
 
 # `Name`, `Name.member`, `veca_marl.path.name`, with or without arguments
 _CODE = re.compile(r"^(?P<path>[A-Za-z_]\w*(?:\.\w+)*)(?:\(.*\))?$", re.DOTALL)
-_IMPORTANT, _OTHER = 0, 2  # priorities of the search: Sphinx's own is 1
 
 
 @cache
@@ -44,21 +44,27 @@ class RankedPythonDomain(PythonDomain):
         """See `Domain.get_objects`: objects and the priority of each."""
         public = set(_public().values())
         for name, shown, kind, page, anchor, priority in super().get_objects():
-            if priority == 1 and kind != "module":
-                owner = name.rpartition(".")[0]
-                rank = _IMPORTANT if name in public or owner in public else _OTHER
-                yield name, shown, kind, page, anchor, rank
-            else:
-                yield name, shown, kind, page, anchor, priority
+            if priority >= 0:  # others are not searched
+                is_public = name in public or name.rpartition(".")[0] in public
+                priority = _priority(kind, is_public)
+            yield name, shown, kind, page, anchor, priority
+
+
+def _priority(kind: str, is_public: bool) -> int:
+    """Return the rank in the search: 0 is important, 1 the default, 2 unimportant."""
+    if kind in ("module", "attribute"):
+        return 1 if is_public or kind == "module" else 2
+    return 0 if is_public else 2
 
 
 def link_code(app: Sphinx, doctree: nodes.document, page: str) -> None:
     """Make references of the code in a page that names an object."""
     domain = app.env.domains["py"]
+    classes = _only_classes(domain.objects)
     for literal in list(doctree.findall(nodes.literal)):
         if isinstance(literal.parent, (nodes.reference, nodes.title)):
             continue
-        target = _target(literal.astext(), domain.objects)
+        target = _target(literal.astext(), domain.objects, classes)
         if target is None:
             continue
         entry = domain.objects[target]
@@ -69,7 +75,7 @@ def link_code(app: Sphinx, doctree: nodes.document, page: str) -> None:
         literal.replace_self(link)
 
 
-def _target(text: str, objects: Any) -> str | None:
+def _target(text: str, objects: Any, classes: Mapping[str, str]) -> str | None:
     """Return the full name of the object that code names; None if it names none."""
     match = _CODE.match(text)
     if match is None:
@@ -79,14 +85,30 @@ def _target(text: str, objects: Any) -> str | None:
         return path
     name, _, member = path.removeprefix("veca_marl.").removeprefix("extend.").partition(".")
     # `train` and `play` by themselves are commands, `world` is an argument
-    if name not in _public() or (name.islower() and name == path and name in _COMMANDS):
+    if name in _COMMANDS and name == path:
         return None
+    if name not in _public():
+        return None if member else classes.get(name)
     if not member:
         return _known(_public()[name], objects)
     return _member(name, member, objects) or _known(_public()[name], objects)
 
 
 _COMMANDS = ("train", "connect", "terms", "zoo")
+
+
+def _only_classes(objects: Any) -> dict[str, str]:
+    """Return the classes by their names where no other class has the name.
+
+    Tasks are left out: they have pages, to which texts link.
+    """
+    named: dict[str, list[str]] = {}
+    for path, entry in objects.items():
+        if entry.objtype == "class":
+            named.setdefault(path.rpartition(".")[2], []).append(path)
+    return {
+        name: paths[0] for name, paths in named.items() if len(paths) == 1 and name not in TASKS
+    }
 
 
 def _known(target: str, objects: Any) -> str | None:
