@@ -44,17 +44,17 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
     },
     "The world and what is in it": {
         "veca_marl.extend": "World PlaygroundCfg RoomCfg DoorCfg LeafCfg Prop PropCfg PropShape "
-        "JointCfg JointKind LockCfg SoundCfg SoundKind",
+        "JointCfg JointKind LockCfg SoundCfg SoundKind ClockCfg",
     },
     "Bodies, senses and interactions": {
         "veca_marl.extend": "Body BodyCfg Walker WalkerCfg WalkCommand Humanoid HumanoidCfg "
-        "register_body Sense ArraySpec register_sense Interaction FootInteraction InteractingBody "
-        "register_interaction",
+        "register_body Call Sense ArraySpec register_sense Interaction FootInteraction "
+        "InteractingBody register_interaction",
     },
     "Learning": {
         "veca_marl.extend": "Algorithm AlgorithmCfg make_algorithm register_algorithm "
         "NetworkFactory NetworkCfg MultisenseCfg Memory with_memory make_network register_network "
-        "team_specs IntrinsicReward IntrinsicCfg register_intrinsic",
+        "action_log_prob team_specs IntrinsicReward IntrinsicCfg register_intrinsic",
     },
     "Data sets": {"veca_marl.datasets": "StoredDataset replay_buffer"},
 }
