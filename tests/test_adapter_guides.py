@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
-import veca_marl  # noqa: F401  registers the ids
+from veca_marl import list_tasks  # the package registers the ids
+from veca_marl.config import compose
+from veca_marl.sim.body.action import VoiceKind
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "docs" / "guides" / "other_libraries.md", ROOT / "README.md"]
@@ -41,3 +43,15 @@ def test_a_snippet_runs(snippet):
     for module in imported(snippet):
         pytest.importorskip(module, exc_type=ImportError)
     exec(compile(snippet, "snippet", "exec"), {})
+
+
+def test_the_ids_that_need_another_layout_are_those_with_several_parts_or_agents():
+    rows = re.findall(r"^\| (\w+(?:, \w+)+): (actions|several agents)", PAGES[0].read_text(), re.M)
+    several = {"actions": set(), "several agents": set()}
+    for name in (task for suite in ("veca", "babybench") for task in list_tasks(suite=suite)):
+        game = compose([f"+task={name}"]).game
+        if sum(team.size for team in game.teams) > 1:
+            several["several agents"].add(name)
+        elif getattr(game.body, "verbs", ()) or game.body.voice is VoiceKind.calls:
+            several["actions"].add(name)
+    assert {kind: set(names.split(", ")) for names, kind in rows} == several

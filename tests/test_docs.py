@@ -83,6 +83,8 @@ def test_the_site_has_types_sources_and_links_and_loads_nothing_from_elsewhere(s
     for page in ("guides/add_a_task.html", "tasks/KickTheBall.html", "reference/api.html"):
         assert 'title="veca_marl.' in (folder / page).read_text(encoding="utf-8"), page
     assert f'title="{task}"' in (folder / "reference" / "api.html").read_text(encoding="utf-8")
+    installation = (folder / "getting_started" / "installation.html").read_text(encoding="utf-8")
+    assert 'title="veca_marl.api.make"' not in installation  # the command make
     assert "<math" in (folder / "reference" / "touch.html").read_text(encoding="utf-8")
     loaded = re.compile(r"<(?:script|link|img)[^>]*(?:src|href)=\"https?://")
     pages = [page for page in folder.rglob("*.html") if "_downloads" not in page.parts]

@@ -8,6 +8,7 @@ come before those of the inner modules.
 from __future__ import annotations
 
 import builtins
+import pkgutil
 import re
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -23,6 +24,8 @@ from veca_marl.envs.core.task import TASKS
 
 # `Name`, `Name.member`, `veca_marl.path.name`, with or without arguments
 _CODE = re.compile(r"^(?P<path>[A-Za-z_]\w*(?:\.\w+)*)(?:\(.*\))?$", re.DOTALL)
+_LIST = "reference/api"
+_WORDS = ("make", "train", "connect", "terms")  # elsewhere these are commands, or words
 
 
 @cache
@@ -64,8 +67,9 @@ def link_code(app: Sphinx, doctree: nodes.document, page: str) -> None:
     for literal in list(doctree.findall(nodes.literal)):
         if isinstance(literal.parent, (nodes.reference, nodes.title)):
             continue
-        target = _target(literal.astext(), domain.objects, classes)
-        if target is None:
+        text = literal.astext()
+        target = _target(text, domain.objects, classes)
+        if target is None or (text in _WORDS and page != _LIST):
             continue
         entry = domain.objects[target]
         if (entry.docname, entry.objtype) == (page, "module"):
@@ -81,20 +85,13 @@ def _target(text: str, objects: Any, classes: Mapping[str, str]) -> str | None:
     if match is None:
         return None
     path = match["path"]
-    if path in objects:
-        return path
     name, _, member = path.removeprefix("veca_marl.").removeprefix("extend.").partition(".")
-    # `train` and `play` by themselves are commands, `world` is an argument
-    if name in _COMMANDS and name == path:
-        return None
-    if name not in _public():
-        return None if member else classes.get(name)
-    if not member:
-        return _known(_public()[name], objects)
-    return _member(name, member, objects) or _known(_public()[name], objects)
-
-
-_COMMANDS = ("train", "connect", "terms", "zoo")
+    if name in _public():
+        own = _member(name, member, objects) if member else None
+        return own or _known(_public()[name], objects)
+    if path.startswith("veca_marl."):
+        return path if path in objects else _known(_full_name(path), objects)
+    return None if member else classes.get(name)
 
 
 def _only_classes(objects: Any) -> dict[str, str]:
@@ -109,6 +106,15 @@ def _only_classes(objects: Any) -> dict[str, str]:
     return {
         name: paths[0] for name, paths in named.items() if len(paths) == 1 and name not in TASKS
     }
+
+
+def _full_name(path: str) -> str:
+    """Return where an object is defined that a package exports; empty if it is none."""
+    try:
+        thing = pkgutil.resolve_name(path)
+    except (AttributeError, ImportError, ValueError):
+        return ""
+    return f"{getattr(thing, '__module__', '')}.{getattr(thing, '__qualname__', '')}"
 
 
 def _known(target: str, objects: Any) -> str | None:
