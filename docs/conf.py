@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -12,6 +13,7 @@ import veca_marl
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
+sys.path += [str(DOCS / "_extensions"), str(ROOT)]  # ROOT: the package tools
 
 project = "veca_marl"
 author = "the authors of veca_marl"
@@ -23,7 +25,11 @@ extensions = [
     "sphinx.ext.apidoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",  # [source]
+    "api_links",
+    "mathml",
 ]
+html_math_renderer = "mathml"
 exclude_patterns = ["_build", "history"]
 default_role = "code"  # docstrings write `name` for code
 
@@ -39,7 +45,10 @@ napoleon_use_ivar = True
 napoleon_custom_sections = [("Terms", "params_style"), ("Observations", "params_style")]
 # an object is documented where it is defined, not in the packages that export it
 autodoc_default_options = {"ignore-module-all": True}
-autodoc_typehints = "none"  # the signature shows them
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+python_use_unqualified_type_names = True
+maximum_signature_line_length = 80  # longer ones have an argument in each line
 autodoc_member_order = "bysource"
 toc_object_entries = False  # thousands of entries in every sidebar otherwise
 
@@ -66,7 +75,7 @@ def copy_pages(_: Sphinx) -> None:
     )
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     # pages of history are in the repository only
-    text = re.sub(r"\[(docs/history/\S+?)\]\(\1\)", r"`\1`", text)
+    text = re.sub(r"\[(docs/history/\S+?)\]\(\1\)", r"`\1`", text).replace("](docs/", "](")
     (DOCS / "changelog.md").write_text(text, encoding="utf-8")
 
 

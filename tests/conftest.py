@@ -12,8 +12,7 @@ from seed_offset import move_seeds
 
 # they take longest: with several test processes they must not be left for the end
 LONGEST = (
-    "first_light.ipynb",
-    "train_in_a_notebook.ipynb",
+    "test_notebooks.py",
     "test_wheel.py",
     "test_plugins.py",
     "test_guides.py",
@@ -52,10 +51,7 @@ def pytest_terminal_summary(terminalreporter, exitstatus, config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are selected by their marks
 def pytest_collection_modifyitems(config, items):
-    """Run the longest tests first; notebooks are slow; leave out stored bytes with moved seeds."""
-    for item in items:
-        if item.path.suffix == ".ipynb":
-            item.add_marker(pytest.mark.slow)
+    """Run the longest tests first; leave out stored bytes with moved seeds."""
     items.sort(key=lambda item: item.path.name not in LONGEST)
     if config.getoption("--seed-offset") == 0:
         return

@@ -81,6 +81,18 @@ def test_an_environment_says_what_it_is_and_where_its_tensors_are():
     env.close()
 
 
+@pytest.mark.parametrize("layout", ["arrays", "flat"])
+def test_environments_of_other_libraries_say_what_they_are(layout):
+    single = veca_marl.gym_env("KickTheBall", senses={"vision": "blind"}, layout=layout)
+    several = veca_marl.parallel_env("PushOut2v2", senses={"vision": "blind"}, layout=layout)
+    for env, parts in (
+        (single, ("KickTheBall", "agents x 1", "audio", "move (2,)")),
+        (several, ("PushOut2v2", "red x 2", "blue x 2", "touch", "joints (40,)")),
+    ):
+        assert all(part in repr(env) for part in parts)
+        env.close()
+
+
 def test_fractions_of_frames_are_refused():
     with pytest.raises(ConfigError, match=naming("total_frames=1.5")):
         veca_marl.train("KickTheBall", total_frames=1.5)

@@ -6,8 +6,10 @@ import importlib
 import inspect
 import io
 import itertools
+import json
 import pkgutil
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +20,7 @@ from sphinx.ext import napoleon
 
 import veca_marl
 from tools import make_docs
+from tools.docs_pages.api_page import public_names
 from tools.docs_pages.bodies_of_tasks import DISCRETE_BODIES
 from tools.docs_pages.body_tables import body_page
 from tools.docs_pages.docstrings import entries, prose
@@ -27,7 +30,7 @@ from tools.docs_pages.pictures import perception_picture, task_picture, touch_pi
 from tools.docs_pages.playground_page import from_above, playground, playgrounds
 from tools.docs_pages.tables import text
 from tools.docs_pages.task_pages import built_in_tasks, task_page
-from veca_marl import list_tasks
+from veca_marl import extend, list_tasks
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS, find_task
@@ -54,10 +57,58 @@ def build_site(folder, *options):
     return build.stderr.splitlines()
 
 
-@pytest.mark.slow  # most of the time is spent on the API reference
-def test_the_site_builds_without_a_warning(tmp_path):
-    assert build_site(tmp_path) == []
-    assert (tmp_path / "html" / "api" / "veca_marl.html").exists()
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the whole site, and the warnings of its build: most of it is the API."""
+    folder = tmp_path_factory.mktemp("site")
+    warnings = build_site(folder)
+    return folder / "html", warnings
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(site):
+    folder, warnings = site
+    assert warnings == []
+    assert (folder / "api" / "veca_marl.html").exists()
+
+
+@pytest.mark.slow
+def test_the_site_has_types_sources_and_links_and_loads_nothing_from_elsewhere(site):
+    folder, _ = site
+    api = (folder / "api" / "veca_marl.html").read_text(encoding="utf-8")
+    made = api.partition('id="veca_marl.api.make"')[2].partition("</dt>")[0]
+    for part in ("worlds", "int", "VecaEnv", "[source]"):
+        assert part in made
+    task = "veca_marl.envs.core.task.Task"
+    for page in ("guides/add_a_task.html", "tasks/KickTheBall.html", "reference/api.html"):
+        assert 'title="veca_marl.' in (folder / page).read_text(encoding="utf-8"), page
+    assert f'title="{task}"' in (folder / "reference" / "api.html").read_text(encoding="utf-8")
+    installation = (folder / "getting_started" / "installation.html").read_text(encoding="utf-8")
+    assert 'title="veca_marl.api.make"' not in installation  # the command make
+    assert "<math" in (folder / "reference" / "touch.html").read_text(encoding="utf-8")
+    loaded = re.compile(r"<(?:script|link|img)[^>]*(?:src|href)=\"https?://")
+    pages = [page for page in folder.rglob("*.html") if "_downloads" not in page.parts]
+    assert [page.name for page in pages if loaded.search(page.read_text(encoding="utf-8"))] == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_search_lists_public_names_first(site):
+    folder, _ = site
+    public = {name: f"{one.__module__}.{one.__qualname__}" for name, one in public_names()}
+    wanted = {name: public[name] for name in ("make", "Body", "Task", "Sense", "PropCfg", "Walker")}
+    wanted["palms"] = f"{public['Body']}.palms"
+    script = ROOT / "tests" / "helpers" / "site_search.js"
+    words = ["node", str(script), str(folder), *wanted]
+    found = subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()
+    first = {name: json.loads(line)[0] for name, line in zip(wanted, found, strict=True)}
+    assert first == wanted
+
+
+def test_every_name_for_plug_ins_is_on_the_page_of_public_names():
+    page = read("reference/api.md")
+    named = set(re.findall(r"^\| `(\w+)` \|", page, re.M))
+    assert set(extend.__all__) | {"make", "gym_env", "parallel_env", "check_task"} <= named
 
 
 @pytest.mark.slow

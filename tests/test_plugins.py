@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 from refusals import naming
 
+from veca_marl import api
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.task import TASKS
 from veca_marl.plugins import PLUGINS, load_plugins
 from veca_marl.runs.assembly import GameFactory
 from veca_marl.runs.run_folder import open_run
+from veca_marl.sim.body.action import VoiceKind
 from veca_marl.sim.body.walker import WalkCommand
 from veca_marl.sim.physics.interactions import INTERACTIONS
 
@@ -90,6 +92,32 @@ def test_an_interaction_of_a_plugin_is_a_verb_that_a_reset_undoes(example):
         assert beacon.sound.muted
         assert refused == [0.0, 1.0]
     game.close()
+
+
+def test_a_class_is_checked_with_the_preset_of_its_package(outside, monkeypatch):
+    write_package(outside, "preset_plugin", task_text("Presetted"))
+    (outside / "preset_plugin" / "conf" / "task").mkdir(parents=True)
+    (outside / "preset_plugin" / "conf" / "task" / "Presetted.yaml").write_text(
+        "# @package _global_\n"
+        "defaults: [/schema/task@task: Presetted, override /body: walker_voice, _self_]\n"
+        "task: {name: Presetted, max_seconds: 3.0}\n"
+    )
+    task = importlib.import_module("preset_plugin").Presetted
+    checked = []
+    monkeypatch.setattr(api, "check_game", lambda cfg, checks: checked.append(cfg))
+    api.check_task(task)
+    assert checked[0].task.max_seconds == 3.0
+    assert checked[0].body.voice is VoiceKind.calls
+
+
+def test_a_task_that_needs_a_voice_refuses_bodies_without_one(outside):
+    text = task_text("Speaking").replace("    senses", "    needs_voice = True\n    senses")
+    write_package(outside, "speaking_plugin", text)
+    words = ["plugins=[speaking_plugin]", "+task=Speaking"]
+    with pytest.raises(ConfigError, match=naming("agents", "voice", "walker_voice")):
+        compose([*words, "body=walker"])
+    for body in ("walker_voice", "mitten_voice"):
+        assert compose([*words, f"body={body}"]).task.name == "Speaking"
 
 
 def test_an_unknown_task_lists_those_of_plugins_too(example):

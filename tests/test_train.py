@@ -57,9 +57,12 @@ def test_available_devices_are_found_and_others_raise_an_error(monkeypatch):
 def test_the_help_fits_a_screen_and_names_the_choices(tmp_path):
     shown = train(tmp_path, "--help")
     assert shown.returncode == 0
-    assert len(shown.stdout.splitlines()) <= 60
-    for part in ("+task=", "resume=", "KickTheBall", "workers32", "--cfg job"):
+    lines = shown.stdout.splitlines()
+    assert len(lines) <= 50
+    assert max(map(len, lines)) <= 80
+    for part in ("+task=", "resume=", "KickTheBall", "workers32", "total_frames", "--cfg job"):
         assert part in shown.stdout
+    assert "schema" not in shown.stdout  # parts of presets are no choices
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """The wheel, installed outside the checkout: it contains `conf/`, makes environments and trains."""
 
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from hatch_build import addresses, with_absolute_links
 from veca_marl.plugins import conf_dir
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -91,3 +93,25 @@ def test_it_makes_environments_and_trains_outside_the_checkout(python, tmp_path)
     assert shape == "torch.Size([1, 3])"
     assert (tmp_path / "run" / "metrics.csv").is_file()
     assert list((tmp_path / "run" / "checkpoints").iterdir())
+
+
+def test_the_readme_of_a_release_has_absolute_links_and_addresses():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    address = "https://example.org/owner/name"
+    released = with_absolute_links(readme, address, "1.2.3")
+    assert "![Both eyes of an agent" in released
+    assert f"]({address}/raw/v1.2.3/docs/images/perception.png)" in released
+    assert f"]({address}/blob/v1.2.3/docs/tasks/gallery.md)" in released
+    targets = re.findall(r"\]\(([^)]+)\)", released)
+    assert len(targets) == len(re.findall(r"\]\(([^)]+)\)", readme))
+    assert all(target.startswith("https://") for target in targets)
+    for target in targets:
+        path = target.removeprefix(f"{address}/blob/v1.2.3/").removeprefix(f"{address}/raw/v1.2.3/")
+        assert path.startswith("https://") or (ROOT / path.partition("#")[0]).exists()
+
+
+def test_the_addresses_of_a_release_lead_to_files():
+    links = addresses("https://example.org/owner/name", "1.2.3")
+    assert {"Homepage", "Source", "Documentation", "Changelog", "Issues"} == set(links)
+    for name in ("Documentation", "Changelog"):
+        assert (ROOT / links[name].partition("/v1.2.3/")[2]).exists()

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tools.docs_pages.action_page import action_page
+from tools.docs_pages.api_page import api_page
 from tools.docs_pages.body_tables import body_page
 from tools.docs_pages.config_page import config_page
 from tools.docs_pages.observation_page import observation_page
@@ -20,6 +21,7 @@ from tools.docs_pages.task_pages import overview_page, write_task_pages
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES: dict[str, Callable[[], str]] = {
     "reference/actions.md": action_page,
+    "reference/api.md": api_page,
     "reference/configuration.md": config_page,
     "reference/observations.md": observation_page,
     "reference/playgrounds.md": playground_page,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
+import sys
 from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import fields
@@ -32,7 +33,7 @@ from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import TASKS, Task
 from veca_marl.gymnasium_ids import register_task
 from veca_marl.override_text import normalised
-from veca_marl.plugins import load_plugins
+from veca_marl.plugins import Plugin, load_plugins
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, find_device, make_trainer
 from veca_marl.runs.continuation import resume_argument
@@ -478,7 +479,8 @@ def check_task(
     solves more episodes; the time of a step.
 
     Args:
-        task: A registered class, or its name.
+        task: A registered class, or its name. The package of a class is loaded as a plug-in if it
+            has configuration files, so that the preset of the task counts.
         checks: How much is played; None is `CheckCfg()`.
         **choices: As for `make`.
 
@@ -495,7 +497,15 @@ def check_task(
     name = task if isinstance(task, str) else task.__name__
     if not isinstance(task, str) and TASKS.get(name) is not task:
         raise ValueError(f"task {name!r} is not registered; decorate the class with @register_task")
-    cfg = choose(name, **choices)
+    cfg = choose(name, **_with_own_plugin(task, choices))
     if checks is not None and not isinstance(checks, CheckCfg):
         raise ConfigError(f"checks={checks!r} must be a CheckCfg, or None")
     return check_game(cfg, checks or CheckCfg())
+
+
+def _with_own_plugin(task: type[Task] | str, choices: GameChoices) -> GameChoices:
+    """Return the choices with the package of a class among the plug-ins, if it has presets."""
+    package = "" if isinstance(task, str) else task.__module__.partition(".")[0]
+    if package == "veca_marl" or package not in sys.modules or Plugin(package).conf is None:
+        return choices
+    return {**choices, "plugins": [*choices.get("plugins", ()), package]}

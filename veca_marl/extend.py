@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from veca_marl.algos.networks.memory import with_memory as with_memory
     from veca_marl.algos.networks.multisense import Memory as Memory
     from veca_marl.algos.networks.multisense import MultisenseCfg as MultisenseCfg
+    from veca_marl.algos.networks.policy_heads import action_log_prob as action_log_prob
     from veca_marl.algos.specs import team_specs as team_specs
     from veca_marl.envs.adapters.torchrl.env import VecaEnv as VecaEnv
     from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy as ExpertPolicy
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from veca_marl.sim.body.walker import WalkCommand as WalkCommand
     from veca_marl.sim.body.walker import Walker as Walker
     from veca_marl.sim.body.walker import WalkerCfg as WalkerCfg
+    from veca_marl.sim.physics.clock import ClockCfg as ClockCfg
     from veca_marl.sim.physics.interactions import FootInteraction as FootInteraction
     from veca_marl.sim.physics.interactions import InteractingBody as InteractingBody
     from veca_marl.sim.physics.interactions import Interaction as Interaction
@@ -68,6 +70,7 @@ if TYPE_CHECKING:
     from veca_marl.sim.sense import ArraySpec as ArraySpec
     from veca_marl.sim.sense import Sense as Sense
     from veca_marl.sim.senses import register_sense as register_sense
+    from veca_marl.sim.sound import Call as Call
     from veca_marl.sim.sound import SoundCfg as SoundCfg
     from veca_marl.sim.sound import SoundKind as SoundKind
 
@@ -77,6 +80,8 @@ _HOMES = {
     "ArraySpec": "veca_marl.sim.sense",
     "Body": "veca_marl.sim.body.base",
     "BodyCfg": "veca_marl.sim.body.base",
+    "Call": "veca_marl.sim.sound",
+    "ClockCfg": "veca_marl.sim.physics.clock",
     "DoorCfg": "veca_marl.sim.physics.rooms",
     "Expert": "veca_marl.envs.core.expert",
     "ExpertPolicy": "veca_marl.envs.adapters.torchrl.scripted",
@@ -114,6 +119,7 @@ _HOMES = {
     "Walker": "veca_marl.sim.body.walker",
     "WalkerCfg": "veca_marl.sim.body.walker",
     "World": "veca_marl.sim.physics.world",
+    "action_log_prob": "veca_marl.algos.networks.policy_heads",
     "find_expert": "veca_marl.envs.core.expert",
     "find_task": "veca_marl.envs.core.task",
     "make_algorithm": "veca_marl.algos.algorithm",

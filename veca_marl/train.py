@@ -31,9 +31,10 @@ from veca_marl.algos.files import DISK_FULL, WriteError
 from veca_marl.algos.training.finite import NotFiniteError
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config, ConfigError, conf_dir, one_line, prepare, to_config
-from veca_marl.config.command_line import VERSION, check_folder, print_version
+from veca_marl.config.command_line import HELP, VERSION, check_folder, print_version
 from veca_marl.config.experiment import check_arm
 from veca_marl.config.stored import change
+from veca_marl.config.training_help import training_help
 from veca_marl.processes.children import end_with_parent
 from veca_marl.processes.supervision import WorkerError
 from veca_marl.registry import unknown
@@ -199,6 +200,10 @@ def main() -> None:
         print_version()
         return
     try:
+        if any(word in HELP for word in sys.argv[1:]):
+            words = [word for word in sys.argv[1:] if not word.startswith("-")]
+            print(training_help(words), end="")
+            return
         _check_config_name(sys.argv[1:])
         sys.argv[1:] = prepare(sys.argv[1:])
         _check_folders(sys.argv[1:])

@@ -264,7 +264,6 @@ def test_a_sound_task_passes_every_check(game_of):
             "rewards",
             naming("agents", "['progress']", "['arrived', 'progress']"),
         ),
-        (TermOfZeros, returns, "reward terms", naming("'arrived'", "4 episodes")),
         (SilentWorld, random_play, "no constant observation", naming("'audio'", "agents")),
     ],
 )
@@ -318,16 +317,28 @@ def test_a_punishment_that_no_policy_earned_is_skipped(game_of):
     assert re.search(naming("'arrived'", "8 episodes", "progress"), found.message)
 
 
+def test_a_reward_that_neither_the_expert_nor_the_random_policy_earned_is_a_failure(game_of):
+    found = returns(game_of(TermOfZeros, EastExpert))[0]
+    assert found.status is Status.failed
+    assert re.search(naming("'arrived'", "8 episodes"), found.message)
+
+
+def test_a_reward_that_the_random_policy_did_not_earn_is_skipped_without_an_expert(game_of):
+    found = returns(game_of(TermOfZeros))[0]
+    assert found.status is Status.skipped
+    assert re.search(naming("'arrived'", "4 episodes", "expert"), found.message)
+
+
 def test_beside_an_unreached_punishment_an_unreached_reward_is_a_failure(game_of):
     class Standing(NeverPunished):
         def reward(self, player):
             return {"progress": 0.0, "arrived": 0.0}
 
-    cfg = game_of(Standing)
+    cfg = game_of(Standing, EastExpert)
     cfg.task.weights["arrived"] = -1.0
     found = returns(cfg)[0]
     assert found.status is Status.failed
-    assert re.search(naming("'progress'", "4 episodes"), found.message)
+    assert re.search(naming("'progress'", "8 episodes"), found.message)
     assert "arrived" not in found.message
 
 

@@ -16,7 +16,8 @@ HEAD = f"""# Actions
 
 The action of a body is a mapping from the name of a *part* to an array. A continuous part is a
 float32 vector in [-1, 1]; a discrete part is one int64 choice. An action holds until the next step;
-a value outside its range is an error that names the part, the value and the choices.
+a value outside its range is an error that names the part, the value and the choices. In code:
+`Body.act`, and `Body.encode` for what an expert commands.
 
 | | body with one part | body with several parts |
 |---|---|---|

@@ -19,7 +19,8 @@ HEAD = """# Observations
 An agent observes a mapping from key to array. In TorchRL the key of an array is
 `(team, "observation", key)` with the shape `(worlds, agents, *shape)`; in Gymnasium and PettingZoo
 the observation is a `Dict` space with the same keys and without the leading dimensions. Shapes do
-not depend on the quality of a sense; a sense that is not present has no key.
+not depend on the quality of a sense; a sense that is not present has no key. In code: `Sense.specs`
+and `ArraySpec`; the environments are `VecaEnv`, `VecaGymEnv` and `VecaParallelEnv`.
 """
 
 MEANINGS = {  # key: sense, unit, meaning, how it is requested

@@ -86,8 +86,17 @@ def setting(task: type[Task], game: GameCfg) -> list[tuple[str, str]]:
         ("departures of the body", departure),
         ("discrete form", discrete_form(task.__name__)),
         ("default playground", f"`playground={choice(task, 'playground')}`"),
+        ("code", code(task)),
     ]
     return [row for row in rows if row[1]]
+
+
+def code(task: type[Task]) -> str:
+    """Return where rules, parameters and expert are defined; the site links to each."""
+    parts = {"rules": task, "parameters": task.cfg_type()}
+    if has_expert(task.__name__):
+        parts["expert"] = find_expert(task.__name__)
+    return ", ".join(f"{name} `{one.__module__}.{one.__qualname__}`" for name, one in parts.items())
 
 
 def choice(task: type[Task], group: str) -> str:

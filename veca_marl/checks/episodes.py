@@ -212,7 +212,8 @@ def check_returns(game: Game, episodes: int, seed: int) -> Iterator[Finding]:
 
     Yields:
         ``reward terms``: each is finite and was not 0 in some step; skipped if only punishments,
-        terms of negative weight, were 0 in all: good play avoids them. ``expert``: the 95 %
+        terms of negative weight, were 0 in all: good play avoids them; and if terms were 0 in all
+        where no expert plays. ``expert``: the 95 %
         interval of the paired difference of the returns is above 0. ``goal``: the expert ends more
         episodes solved than the random policy. The last two are skipped without an expert that can
         play, and the last one without a goal.
@@ -220,7 +221,7 @@ def check_returns(game: Game, episodes: int, seed: int) -> Iterator[Finding]:
     random = _play_all(game, Script.random, episodes, seed)
     reason = _no_expert(game)
     expert = [] if reason else _play_all(game, Script.expert, episodes, seed)
-    yield _terms(game, [*random, *expert])
+    yield _terms(game, [*random, *expert], reason)
     if reason:
         yield from (Finding(name, Status.skipped, reason) for name in RETURN_NAMES[1:])
         return
@@ -259,18 +260,25 @@ def _play_episode(game: Game, script: Script, rng: np.random.Generator) -> _Play
     return _Played(score, solved, frozenset(nonzero), tuple(dict.fromkeys(problems)))
 
 
-def _terms(game: Game, played: Sequence[_Played]) -> Finding:
+def _terms(game: Game, played: Sequence[_Played], no_expert: str) -> Finding:
     problems = list(dict.fromkeys(text for one in played for text in one.problems))
     reached = frozenset[str]().union(*(one.nonzero for one in played))
     unreached = {name: weight for name, weight in game.weights.items() if name not in reached}
-    problems += [
-        f"term {name!r} is 0 in all steps of {len(played)} episodes"
-        for name, weight in unreached.items()
-        if weight >= 0.0
-    ]
+    unearned = [name for name, weight in unreached.items() if weight >= 0.0]
+    if unearned and no_expert and not problems:
+        return Finding("reward terms", Status.skipped, _unearned(unearned, no_expert, len(played)))
+    problems += [f"term {name!r} is 0 in all steps of {len(played)} episodes" for name in unearned]
     if unreached and not problems:
         return Finding("reward terms", Status.skipped, _unpunished(game, unreached, len(played)))
     return finding("reward terms", problems, f"{', '.join(game.weights)}: each is reached")
+
+
+def _unearned(terms: Collection[str], no_expert: str, episodes: int) -> str:
+    """Return why terms that the random policy did not earn could not be checked."""
+    return (
+        f"the random policy did not earn {', '.join(map(repr, terms))} in {episodes} episodes, and "
+        f"{no_expert}: register one, play more, or test the terms yourself"
+    )
 
 
 def _unpunished(game: Game, punishments: Collection[str], episodes: int) -> str:

@@ -29,7 +29,7 @@ from veca_marl.version import __version__
 Options = TypeVar("Options")
 
 _MULTIRUN = ("-m", "--multirun")
-_HELP = ("-h", "--help")
+HELP = ("-h", "--help")
 VERSION = "--version"
 _STATUS_INTERRUPTED = 130
 
@@ -78,7 +78,7 @@ class CommandLine(Generic[Options]):
             0, or 2 after an error of the configuration, which is printed as one line.
         """
         words = list(sys.argv[1:] if words is None else words)
-        if any(word in _HELP for word in words):
+        if any(word in HELP for word in words):
             sys.stdout.write(self.help())
             return 0
         if VERSION in words:

@@ -65,6 +65,29 @@ def test_moving_and_turning_does_not_click():
     assert 20 * np.log10(np.abs(clicks).max() / np.abs(heard).max()) < -70.0
 
 
+def test_ears_that_are_deaf_to_a_source_hear_the_others_as_if_it_were_not_there():
+    def hear(names, deaf_to):
+        field = SoundField(None, STEP, RATE)
+        for index, name in enumerate(names):
+            rng = np.random.default_rng(index)
+            field.add_source(name, Clip(rng.standard_normal(6 * STEP)))
+        listeners = [field.add_listener(make_receiver("mono"), deaf_to=d) for d in ((), deaf_to)]
+        field.reset(np.random.default_rng(0))
+        for index, source in enumerate(field.sources.values()):
+            source.position = (1.0 + index, 0.5, 0.0)
+        heard = []
+        for _ in range(6):
+            field.advance()
+            heard.append([listener.render(STILL) for listener in listeners])
+        return np.array(heard).swapaxes(0, 1)
+
+    every, one = hear(["voice", "beeper"], {"beeper"})
+    alone, silence = hear(["voice"], {"voice"})
+    assert np.array_equal(one, alone)
+    assert not np.array_equal(every, alone)
+    assert not silence.any()
+
+
 def test_a_source_that_moved_in_silence_starts_at_its_new_position():
     """Otherwise its first word would sweep along the way it went unheard."""
     voice, word = Voice(RATE), noise(3 * STEP)

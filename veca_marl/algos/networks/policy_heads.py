@@ -15,8 +15,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import torch
+from tensordict import TensorDictBase
 from tensordict.nn import CompositeDistribution, NormalParamExtractor
-from torch import nn
+from torch import Tensor, nn
 from torch.distributions import Categorical, Distribution
 from torchrl.modules import TanhNormal
 
@@ -80,6 +82,23 @@ def log_prob_keys(team: str, actions: Mapping[str, ActionLayout]) -> list[tuple[
     return [
         (*key[:-1], f"{key[-1]}_log_prob") for key in (action_key(team, part) for part in actions)
     ]
+
+
+def action_log_prob(distribution: Any, batch: TensorDictBase, team: str) -> Tensor:
+    """Return the log-probability of the actions in a batch, ``(..., agents)``.
+
+    Parts of an action are independent given the observation: theirs are added.
+
+    Args:
+        distribution: What ``actor.get_dist(batch)`` returns, for one part or several.
+        batch: Has the actions of the team.
+        team: Name of the team.
+    """
+    if isinstance(distribution, CompositeDistribution):
+        parts = [part.log_prob(batch[key]) for key, part in distribution.dists.items()]
+        return torch.stack(parts).sum(0)
+    likelihood: Tensor = distribution.log_prob(batch[team, "action"])
+    return likelihood
 
 
 def _drawn_parts(team: str, actions: Mapping[str, ActionLayout]) -> list[DrawnPart]:

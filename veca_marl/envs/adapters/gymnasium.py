@@ -56,6 +56,10 @@ class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
         self._actions = layout.actions(player)
         self.action_space = self._actions.space
 
+    def __repr__(self) -> str:
+        """Return the task, the agents, and what they sense and do."""
+        return self._played.described("VecaGymEnv")
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:

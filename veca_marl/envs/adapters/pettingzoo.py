@@ -58,6 +58,10 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
         self.action_spaces = {name: actions.space for name, actions in self._actions.items()}
         self.state_space = Box(-np.inf, np.inf, (self._played.state_size,), np.float32)
 
+    def __repr__(self) -> str:
+        """Return the task, the agents, and what they sense and do."""
+        return self._played.described("VecaParallelEnv")
+
     def observation_space(self, agent: str) -> Space:
         """Return the space of an agent's observations: by default a `Dict` with one per sense."""
         return self.observation_spaces[self._known(agent)]

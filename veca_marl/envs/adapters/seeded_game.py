@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from veca_marl.envs.adapters.hosts import HERE, Host
 from veca_marl.envs.adapters.human_window import HumanWindow
 from veca_marl.envs.core.episodes import Episodes
-from veca_marl.envs.core.game import Observation, refuse_closed
+from veca_marl.envs.core.game import Observation, describe_teams, refuse_closed
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.snapshot import Restoring, Snapshot, Snapshots
 from veca_marl.envs.core.task import SOLVED
@@ -113,6 +113,10 @@ class SeededGame:
         self._render_mode = render_mode
         self._running = False
         self._closed = False
+
+    def described(self, adapter: str) -> str:
+        """Return the `repr` of the environment that plays it."""
+        return f"{adapter}({self.game.cfg.task.name}, {describe_teams(self.game)})"
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None

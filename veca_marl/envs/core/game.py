@@ -6,6 +6,7 @@ Every adapter (TorchRL, Gymnasium, PettingZoo) plays its episodes through this c
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from numbers import Real
 from types import MappingProxyType
@@ -429,3 +430,22 @@ def refuse_closed(is_closed: bool) -> None:
     """
     if is_closed:
         raise RuntimeError("the environment is closed; make a new one")
+
+
+def describe_teams(game: Game) -> str:
+    """Return teams, agents, what they sense and what they do, in one line, for a `repr`."""
+    players = {player.team: player for player in reversed(game.actors)}  # the first of each team
+    counts = Counter(player.team for player in game.actors)
+    return "; ".join(
+        f"{team} x {count}: {_described_player(game, players[team])}"
+        for team, count in counts.items()
+    )
+
+
+def _described_player(game: Game, player: Player) -> str:
+    keys = [key for sense in game.senses[player.name].values() for key in sense.specs]
+    actions = ", ".join(
+        f"{name} of {int(spec.high) + 1}" if spec.is_discrete else f"{name} {spec.shape}"
+        for name, spec in player.body.action_spec.items()
+    )
+    return f"{', '.join(keys)} -> {actions}"

@@ -119,11 +119,12 @@ class GameCfg:
         """Check that the task can be played with the bodies of all teams.
 
         Raises:
-            ValueError: If a body is of another kind than it needs, or lacks a verb.
+            ValueError: If a body is of another kind than it needs, or lacks a verb or a voice.
         """
         task = find_task(self.task.name)
         for team in self.teams:
-            check_body(team.name, self.body_of(team.name), task.body_cfg, task.verbs)
+            body = self.body_of(team.name)
+            check_body(team.name, body, task.body_cfg, task.verbs, task.needs_voice)
 
     def check_playground(self) -> None:
         """Check that the task and all its players fit into the playground.

@@ -13,6 +13,7 @@ import numpy as np
 
 from veca_marl.registry import Registry
 from veca_marl.sim.body import Body, BodyCfg
+from veca_marl.sim.body.action import VoiceKind
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry import Floats
@@ -25,20 +26,33 @@ _KINDS: dict[type[BodyCfg], str] = {
 }
 
 
-def check_body(owner: str, body: BodyCfg, needed: type[BodyCfg], verbs: Sequence[str] = ()) -> None:
-    """Check that a body is of the kind that a task needs, and has the verbs that it needs.
+def check_body(
+    owner: str,
+    body: BodyCfg,
+    needed: type[BodyCfg],
+    verbs: Sequence[str] = (),
+    needs_voice: bool = False,
+) -> None:
+    """Check that a body is of the kind that a task needs, with the verbs and the voice it needs.
 
     Args:
         owner: The team or the player, for the message.
         body: Parameters of the body; their class is its kind.
         needed: The class that is needed; `BodyCfg` for any.
         verbs: Choices of the action part `verb` that are needed.
+        needs_voice: Whether the action part `voice` is needed.
 
     Raises:
-        ValueError: If the body is of another kind, lacks a verb, or its verbs reach nothing.
+        ValueError: If the body is of another kind, lacks a verb or a voice, or its verbs reach
+            nothing.
     """
     if not isinstance(body, needed):
         raise wrong_body(owner, needed)
+    if needs_voice and body.voice is not VoiceKind.calls:
+        raise ValueError(
+            f"{owner}: this task needs a voice; choose body.voice=calls, or a body such as "
+            "walker_voice, walker_discrete_voice, mitten_voice or full_voice"
+        )
     own = list(getattr(body, "verbs", ()))
     missing = sorted(set(verbs) - set(own))
     if missing:
@@ -202,6 +216,7 @@ class Task(ABC):
         body_cfg: Class of the parameters of the bodies that can play it: `WalkerCfg`,
             `HumanoidCfg`, or `BodyCfg` for any.
         verbs: Choices of the action part `verb` that it needs.
+        needs_voice: Whether it needs the action part `voice`, with which bodies call.
         rates: Names of the reward terms that are earned as long as a state lasts, such as a speed
             or a height, and not by a change or an event. Their weights are for a step of
             `RATE_STEP_S`; with another clock they are proportional to the duration of a step, so
@@ -217,6 +232,7 @@ class Task(ABC):
     senses: ClassVar[tuple[str, ...]] = ()
     body_cfg: ClassVar[type[BodyCfg]] = BodyCfg
     verbs: ClassVar[tuple[str, ...]] = ()
+    needs_voice: ClassVar[bool] = False
     rates: ClassVar[tuple[str, ...]] = ()
     eliminates: ClassVar[bool] = False
     suite: ClassVar[str] = "veca"

@@ -95,6 +95,9 @@ class Body(ABC):
         joint_names: The 82 joints, such as `l_forearm.flexion`, in the order of all joint arrays.
         bone_names: The 47 bones, such as `l_forearm`, in the order of all bone arrays.
         interaction_range_m: See `BodyCfg`.
+        deaf_to: Names of sound sources that its ears do not hear, for experiments on communication:
+            a prop that emits a sound, or ``NAME.voice`` of the player NAME. `Task.build` fills it;
+            it stays as it is for the life of the world.
     """
 
     cfg_type: ClassVar[type[BodyCfg]]
@@ -114,6 +117,7 @@ class Body(ABC):
         self._gaze = Gaze(math.radians(cfg.eye_range_deg))
         self._sight: Sight | None = None
         self._call_pause_s = cfg.call_pause_s
+        self.deaf_to: set[str] = set()
         self.interaction_range_m = cfg.interaction_range_m
         self.joint_names = tuple(f"{j.bone}.{j.label}" for j in self._skeleton.joints)
         self.bone_names = tuple(bone.name for bone in self._skeleton.bones)

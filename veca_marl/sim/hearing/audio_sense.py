@@ -342,7 +342,9 @@ class AudioSense(Sense):
         self._centre, nearest_m = _centre_of_ears(body), _mouth_to_ears_m(body)
         self._steps_in_window = math.ceil(WINDOW_SAMPLES / field.step_samples)
         self._listener = field.add_listener(
-            make_receiver(cfg, field.sample_rate_hz, nearest_m), self._steps_in_window
+            make_receiver(cfg, field.sample_rate_hz, nearest_m),
+            self._steps_in_window,
+            body.deaf_to,
         )
         self._teleports = body.teleports
         self._encoder = make_encoder(cfg.encoding, cfg.window, cfg.noise_floor_db, cfg.bins)

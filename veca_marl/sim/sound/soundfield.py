@@ -6,7 +6,7 @@ signals. Sound advances by the steps of the simulation's clock alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,8 +48,10 @@ class Listener:
         clock: SoundClock,
         receiver: Receiver,
         memory_steps: int = 1,
+        deaf_to: Container[str] = (),
     ) -> None:
         self._sources = sources
+        self._deaf_to = deaf_to
         self._clock = clock
         self._memory_steps = memory_steps
         n = clock.step_samples
@@ -140,7 +142,7 @@ class Listener:
 
     def _all_propagations(self) -> list[Propagation]:
         for name, source in self._sources.items():
-            if name not in self._propagations:
+            if name not in self._propagations and name not in self._deaf_to:
                 self._propagations[name] = Propagation(source, self._ears)
         return list(self._propagations.values())
 
@@ -231,14 +233,20 @@ class SoundField:
         for listener in self._listeners:
             listener.forget(source)
 
-    def add_listener(self, receiver: Receiver, memory_steps: int = 1) -> Listener:
+    def add_listener(
+        self, receiver: Receiver, memory_steps: int = 1, deaf_to: Container[str] = ()
+    ) -> Listener:
         """Add a pair of ears with a receiver of its own.
 
         Args:
             receiver: Turns the sound that arrives at the head into two signals.
             memory_steps: How many earlier steps `Listener.rejoin` can return.
+            deaf_to: Names of sources that these ears do not hear; read when a source is first
+                heard.
         """
-        listener = Listener(self.sources, self._surroundings, self._clock, receiver, memory_steps)
+        listener = Listener(
+            self.sources, self._surroundings, self._clock, receiver, memory_steps, deaf_to
+        )
         self._listeners.append(listener)
         self._memory_samples = max(self._memory_samples, listener.memory_samples)
         for source in self.sources.values():

@@ -15,7 +15,14 @@ from veca_marl.envs.adapters.hosts import HERE, Host
 from veca_marl.envs.adapters.seeded_game import NotCopied
 from veca_marl.envs.adapters.torchrl.fast_step import Arrays, FastStepEnv, Layout
 from veca_marl.envs.core.episodes import Episodes, check_integer, fresh_seed
-from veca_marl.envs.core.game import ActionSpec, Game, Outcome, from_parts, refuse_closed
+from veca_marl.envs.core.game import (
+    ActionSpec,
+    Game,
+    Outcome,
+    describe_teams,
+    from_parts,
+    refuse_closed,
+)
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.snapshot import Restoring, Snapshot, Snapshots
 from veca_marl.envs.core.task import SOLVED, Player
@@ -274,17 +281,8 @@ class VecaEnv(NotCopied, FastStepEnv):
 
     def __repr__(self) -> str:
         """Return the task, the worlds, the agents, and what they sense and do."""
-        teams = "; ".join(self._described(team) for team in self._teams)
+        teams = describe_teams(self.games[0])
         return f"VecaEnv({self.cfg.task.name}, worlds={len(self.games)}, {teams})"
-
-    def _described(self, team: str) -> str:
-        senses = ", ".join(self.observation_spec[team, "observation"].keys())
-        parts = self.games[0].team(team)[0].body.action_spec
-        actions = ", ".join(
-            f"{name} of {int(spec.high) + 1}" if spec.is_discrete else f"{name} {spec.shape}"
-            for name, spec in parts.items()
-        )
-        return f"{team} x {len(self.group_map[team])}: {senses} -> {actions}"
 
     def _set_seed(self, seed: int | None) -> None:
         seed = fresh_seed() if seed is None else seed
