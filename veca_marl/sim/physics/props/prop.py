@@ -12,6 +12,8 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Protocol
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import (
     Floats,
@@ -464,18 +466,13 @@ def copy_all_poses(props: Sequence[Prop]) -> list[str]:
 def _copy_poses(props: Sequence[Prop], poses: Sequence[tuple[Vector, Quaternion]]) -> list[str]:
     """Copy poses of Bullet, one or more, to where `follow_physics` says; return what it returns."""
     positions, rotations = props[0]._scene.positions, props[0]._scene.rotations
-    centres, orientations = zip(*poses, strict=True)
-    origins, quaternions = np.array(centres), np.array(orientations)
-    # false for numbers that are not finite
-    valid = (np.abs(origins) < _LARGEST_M).all(axis=1) & np.isfinite(quaternions).all(axis=1)
+    numbers = np.array([(*centre, *orientation) for centre, orientation in poses])
+    rows = np.array([prop.row for prop in props])
+    valid = _write_poses(numbers, rows, positions, rotations)
     if not valid.all():
         return [prop.name for prop, good in zip(props, valid, strict=True) if not good]
-    rows = [prop.row for prop in props]
-    matrices = np.empty((len(props), 3, 3))
-    quaternions_to_matrices(quaternions, matrices)
-    positions[rows] = origins
-    rotations[rows] = matrices
-    for row, prop, pose in zip(rows, props, poses, strict=True):
+    for prop, pose in zip(props, poses, strict=True):
+        row = prop.row
         prop._last_pose = pose
         if prop._axes is not None:
             rotations[row] = rotations[row] @ prop._axes.T
@@ -490,6 +487,32 @@ def _copy_poses(props: Sequence[Prop], poses: Sequence[tuple[Vector, Quaternion]
         if prop.joint is not None:
             prop.joint.moved = False
     return []
+
+
+@njit(cache=True)
+def _write_poses(
+    poses: Floats, rows: NDArray[np.int64], positions: Floats, rotations: Floats
+) -> NDArray[np.bool_]:
+    """Write poses into a scene if all are valid; return which are, ``(n,)``.
+
+    Args:
+        poses: ``(n, 7)`` positions in metres and quaternions (x, y, z, w); not finite or far away
+            where a simulation has failed.
+        rows: ``(n,)`` their frames.
+        positions: ``(F, 3)`` metres, of all frames; written.
+        rotations: ``(F, 3, 3)``, likewise.
+    """
+    valid = np.empty(len(rows), np.bool_)
+    for n in range(len(rows)):
+        near = np.abs(poses[n, :3]) < _LARGEST_M  # false for numbers that are not finite
+        valid[n] = near.all() and np.isfinite(poses[n, 3:]).all()
+    if valid.all():
+        matrices = np.empty((len(rows), 3, 3))
+        quaternions_to_matrices(poses[:, 3:], matrices)
+        for n in range(len(rows)):
+            positions[rows[n]] = poses[n, :3]
+            rotations[rows[n]] = matrices[n]
+    return valid
 
 
 def _anything(prop: Prop) -> bool:
