@@ -14,7 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from veca_marl.algos.algorithm import make_algorithm
 from veca_marl.algos.checkpoints import Checkpoints, Identity
-from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.collection.experience import CollectCfg, check_engine
 from veca_marl.algos.collection.host_limits import that_fits
 from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.reporting import Reporter, check_installed, make_reporter
@@ -97,7 +97,7 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
             learns.
         CheckpointError: If a run to continue or to load from does not fit.
     """
-    _check_loggers(cfg)
+    _check_installed(cfg)
     device = _prepare_torch(cfg)
     specs = read_specs(cfg.game)
     learners = make_learners(cfg, specs, device)
@@ -199,9 +199,10 @@ def _self_play(cfg: Config, folder: RunFolder | None, learners: TeamLearners) ->
     return SelfPlay(cfg.self_play, learners, Pool(folder.pool), cfg.seed)
 
 
-def _check_loggers(cfg: Config) -> None:
-    """Refuse to train where the package of a logger is missing; a stored run can be read there."""
+def _check_installed(cfg: Config) -> None:
+    """Refuse to train where a package is missing; a stored run can be read there."""
     try:
+        check_engine(cfg.collect.engine)
         for kind in cfg.log.logger:
             check_installed(kind)
     except ValueError as error:

@@ -12,7 +12,7 @@ import torch
 from tensordict.nn import TensorDictModuleBase
 from torchrl import timeit
 
-from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.collection.experience import CollectCfg, Engine
 from veca_marl.algos.reporting import MemoryReporter, Reporter, Row
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config
@@ -173,6 +173,8 @@ def _warn_of_contention() -> None:
 
 def _log_idle_cores(collect: CollectCfg) -> None:
     """Log that more processes could step the worlds, if there are cores for them."""
+    if collect.engine is Engine.ray:  # the cores of a cluster are those that were reserved
+        return
     hint = idle_cores_hint(collect.processes, collect.worlds, usable_cores(), load())
     if hint:
         _LOG.info(hint)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import Enum
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -19,6 +23,18 @@ from veca_marl.algos.collection.workers import SupervisedCollector
 from veca_marl.algos.networks.memory import memory_of, with_transform
 from veca_marl.algos.specs import EnvFactory
 from veca_marl.processes.supervision import Limit
+
+
+class Engine(Enum):
+    """What runs the processes that collect; batches are the same, byte for byte.
+
+    Attributes:
+        processes: Worker processes of this machine, by TorchRL's `MultiSyncCollector`.
+        ray: Actors of a cluster of Ray, by TorchRL's `RayCollector`.
+    """
+
+    processes = "processes"
+    ray = "ray"
 
 
 @dataclass
@@ -40,6 +56,9 @@ class CollectCfg:
         server: Address of a server that has the worlds (`veca_marl.serve`), such as
             ``tcp://host:5555``; None plays them on this machine.
         key: File with the keys of this machine for the server; None for a server without keys.
+        engine: What runs the processes; with ``ray`` they are actors, each of which reserves
+            `threads` cores of the cluster that ``ray start`` has made or ``RAY_ADDRESS`` names.
+            Without a cluster they are on this machine.
     """
 
     processes: int = 2
@@ -49,6 +68,7 @@ class CollectCfg:
     answer_limit_s: float = 600.0
     server: str | None = None
     key: str | None = None
+    engine: Engine = Engine.processes
 
     def __post_init__(self) -> None:
         if self.processes < 0:
@@ -58,6 +78,8 @@ class CollectCfg:
                 raise ValueError(f"collect.{name} must be at least 1, got {getattr(self, name)}")
         if not self.answer_limit_s > 0:
             raise ValueError(f"collect.answer_limit_s must be positive, got {self.answer_limit_s}")
+        if self.engine is Engine.ray and self.processes == 0:
+            raise ValueError("collect.engine=ray needs at least 1 actor, got collect.processes=0")
 
     @property
     def limit(self) -> Limit:
@@ -73,6 +95,16 @@ class CollectCfg:
     def frames(self) -> int:
         """Frames in a batch."""
         return self.all_worlds * self.steps
+
+
+def check_engine(engine: Engine) -> None:
+    """Check that what runs the processes is installed.
+
+    Raises:
+        ValueError: If it is not.
+    """
+    if engine is Engine.ray and find_spec("ray") is None:
+        raise ValueError("collect.engine=ray: Ray is not installed: pip install 'veca_marl[ray]'")
 
 
 class NoExperience:
@@ -130,6 +162,8 @@ class Experience:
         }
         if cfg.processes == 0:
             self._collector = Collector(make, policy, **common)
+        elif cfg.engine is Engine.ray:
+            self._collector = _with_actors(make, policy, cfg, common)
         else:
             threads = torch.get_num_threads()
             with _start_method(start_method(cfg.threads)):
@@ -168,6 +202,16 @@ class Experience:
 
 def _make_env(make_env: EnvFactory, worlds: int, memory: Compose | None) -> EnvBase:
     return with_transform(make_env(worlds, 0), memory)  # seeded by `restart`
+
+
+def _with_actors(
+    make: Callable[[], EnvBase], policy: TensorDictModuleBase, cfg: CollectCfg, common: Any
+) -> Any:
+    """Return the collector of Ray's actors; its module needs the extra ``[ray]``."""
+    actors = import_module("veca_marl.algos.collection.actors")
+    return actors.SupervisedRayCollector(
+        [make] * cfg.processes, policy, limit=cfg.limit, threads=cfg.threads, **common
+    )
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.algos.collection.experience import CollectCfg, Engine
 from veca_marl.algos.specs import TeamSpec
 
 SHARED_MEMORY = Path("/dev/shm")
@@ -33,7 +33,7 @@ def shared_bytes(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
         cfg: Number of worlds and processes; without processes it is 0.
         specs: The arrays of each team.
     """
-    if cfg.processes == 0:
+    if not _shares(cfg):
         return 0
     frame = sum(
         spec.agents * sum(layout.n_bytes for layout in spec.observations.values())
@@ -42,9 +42,14 @@ def shared_bytes(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
     return int(_PER_OBSERVATION * frame * cfg.frames) + _BASE_BYTES
 
 
+def _shares(cfg: CollectCfg) -> bool:
+    """Return whether batches are in shared memory; Ray writes what has no room there to disk."""
+    return cfg.processes > 0 and cfg.engine is Engine.processes
+
+
 def open_files(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
     """Return an estimate of the files that a run with worker processes has open."""
-    if cfg.processes == 0:
+    if not _shares(cfg):
         return 0
     arrays = sum(len(spec.observations) + len(spec.actions) for spec in specs.values())
     return _BASE_FILES + cfg.processes * (_FILES_PER_PROCESS + _FILES_PER_ARRAY * arrays)
