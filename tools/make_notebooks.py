@@ -34,7 +34,7 @@ def executed(path: Path) -> Any:
     Raises:
         nbclient.exceptions.CellExecutionError: If a cell raises an error.
     """
-    notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
+    notebook = nbformat.read(path, as_version=4)
     resources = {"metadata": {"path": str(path.parent)}}
     NotebookClient(
         notebook, timeout=_TIMEOUT_S, kernel_name="python3", resources=resources
@@ -89,7 +89,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", choices=[*names, []], help="notebooks; all without one")
     for name in parser.parse_args().names or names:
         path = EXAMPLES / f"{name}.ipynb"
-        nbformat.write(stripped(executed(path)), path)  # type: ignore[no-untyped-call]
+        nbformat.write(stripped(executed(path)), path)
 
 
 if __name__ == "__main__":
