@@ -24,7 +24,7 @@ from veca_marl.envs.core.task import TASKS
 
 # `Name`, `Name.member`, `veca_marl.path.name`, with or without arguments
 _CODE = re.compile(r"^(?P<path>[A-Za-z_]\w*(?:\.\w+)*)(?:\(.*\))?$", re.DOTALL)
-_LIST = "reference/api"
+_NAMES = ("reference/api", "api/")  # pages in which each code is a name
 _WORDS = ("make", "train", "connect", "terms")  # elsewhere these are commands, or words
 
 
@@ -69,7 +69,7 @@ def link_code(app: Sphinx, doctree: nodes.document, page: str) -> None:
             continue
         text = literal.astext()
         target = _target(text, domain.objects, classes)
-        if target is None or (text in _WORDS and page != _LIST):
+        if target is None or (text in _WORDS and not page.startswith(_NAMES)):
             continue
         entry = domain.objects[target]
         if (entry.docname, entry.objtype) == (page, "module"):

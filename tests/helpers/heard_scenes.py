@@ -21,6 +21,7 @@ class Dummy:
     """A head with two ears slightly behind its centre."""
 
     teleports = 0
+    deaf_to = frozenset()
 
     def __init__(self):
         self.position = np.zeros(3)

@@ -92,12 +92,12 @@ class Body(ABC):
         action_spec: The parts of the action that `act` takes, by name: a float32 vector in
             [-1, 1], or one of several choices (shape ``()``, int64).
         own_head_frames: Indices of the frames (bones) that its own eyes do not see.
-        joint_names: The 82 joints, such as `l_forearm.flexion`, in the order of all joint arrays.
-        bone_names: The 47 bones, such as `l_forearm`, in the order of all bone arrays.
-        interaction_range_m: See `BodyCfg`.
         deaf_to: Names of sound sources that its ears do not hear, for experiments on communication:
             a prop that emits a sound, or ``NAME.voice`` of the player NAME. `Task.build` fills it;
             it stays as it is for the life of the world.
+        joint_names: The 82 joints, such as `l_forearm.flexion`, in the order of all joint arrays.
+        bone_names: The 47 bones, such as `l_forearm`, in the order of all bone arrays.
+        interaction_range_m: See `BodyCfg`.
     """
 
     cfg_type: ClassVar[type[BodyCfg]]
@@ -117,7 +117,6 @@ class Body(ABC):
         self._gaze = Gaze(math.radians(cfg.eye_range_deg))
         self._sight: Sight | None = None
         self._call_pause_s = cfg.call_pause_s
-        self.deaf_to: set[str] = set()
         self.interaction_range_m = cfg.interaction_range_m
         self.joint_names = tuple(f"{j.bone}.{j.label}" for j in self._skeleton.joints)
         self.bone_names = tuple(bone.name for bone in self._skeleton.bones)
@@ -125,6 +124,7 @@ class Body(ABC):
         self._angles, self._speeds, self._torques = (np.zeros(joints) for _ in range(3))
         self._pelvis_velocity, self._pelvis_spin = np.zeros(3), np.zeros(3)
         self.action_spec = {**self._movement_spec(cfg), **voice_spec(cfg.voice)}
+        self.deaf_to: set[str] = set()
 
     def _add_to_scene(self, shirt: tuple[float, float, float]) -> None:
         scene = self._world.scene
