@@ -2,7 +2,8 @@
 
 Rings of points in the frames of the bones are joined by bands of triangles and closed by caps. The
 rims of thighs and fingers are open; they lie inside pelvis, feet and palms. The right side is the
-mirror image of the left. The numbers are our own design.
+mirror image of the left. The numbers are our own design, for the body of 0.78 m; that of a body of
+another size has each vertex scaled in the frame of its bone.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from veca_marl.sim.body.anatomy.growth import REFERENCE, Growth
 from veca_marl.sim.body.anatomy.kinematics import forward_kinematics
 from veca_marl.sim.body.anatomy.skeleton import Bone, Skeleton, load_skeleton
 from veca_marl.sim.geometry import Floats, Mesh, Shape
@@ -80,19 +82,25 @@ TRUNK_SECTORS, ARM_SECTORS, LEG_SECTORS, FOOT_SECTORS, FINGER_SECTORS = 12, 8, 1
 
 
 class Loft:
-    """Collects vertices, each in the frame of one bone, and triangles, each of one bone."""
+    """Collects vertices, each in the frame of one bone, and triangles, each of one bone.
 
-    def __init__(self, skeleton: Skeleton) -> None:
+    Args:
+        skeleton: The table of bones.
+        growth: The size of the body that the vertices are scaled to.
+    """
+
+    def __init__(self, skeleton: Skeleton, growth: Growth = REFERENCE) -> None:
         self._skeleton = skeleton
+        self._growth = growth
         self.owners: list[int] = []
         self.points: list[Floats] = []
         self.triangles: list[tuple[int, int, int]] = []
         self.triangle_bones: list[int] = []
 
     def point(self, bone: str, point: Sequence[float] | Floats) -> int:
-        """Add a vertex ``(3,)`` in the frame of a bone, metres; return its number."""
+        """Add a vertex ``(3,)`` in the frame of a bone of 0.78 m, metres; return its number."""
         self.owners.append(self._skeleton.bone(bone))
-        self.points.append(np.array(point, float))
+        self.points.append(np.array(point, float) * self._growth.of(bone).vector)
         return len(self.points) - 1
 
     def ring(self, bone: str, points: Floats) -> list[int]:
@@ -269,7 +277,8 @@ def _zone_above_m(skeleton: Skeleton, bone: Bone) -> float:
     parent = skeleton.bones[bone.parent]
     if _continues(parent, bone):
         return _BEND_SHARE * min(_length_m(bone), _length_m(parent))
-    return _KNUCKLE_ZONE_M if parent.colliders[0].shape is Shape.BOX else _BRANCH_ZONE_M
+    zone_m = _KNUCKLE_ZONE_M if parent.colliders[0].shape is Shape.BOX else _BRANCH_ZONE_M
+    return zone_m * skeleton.growth.of(bone.name).girth
 
 
 def _follows(skeleton: Skeleton, owner: int, point: Floats) -> tuple[int, float]:
@@ -309,13 +318,17 @@ def bind(skeleton: Skeleton, loft: Loft) -> Mesh:
     )
 
 
+def load_skin(growth: Growth = REFERENCE) -> Mesh:
+    """Return the skin of a size, grey, its triangles sorted by bone (once per process)."""
+    return _skin(growth)
+
+
 @functools.cache
-def load_skin() -> Mesh:
-    """Return the skin of the skeleton, grey, its triangles sorted by bone (once per process)."""
+def _skin(growth: Growth) -> Mesh:
     skeleton = load_skeleton()
-    loft = Loft(skeleton)
+    loft = Loft(skeleton, growth)
     loft_trunk(loft)
     first_vertex, first_triangle = len(loft.points), len(loft.triangles)
     loft_left_side(loft, skeleton)
     loft.mirror(first_vertex, first_triangle)
-    return bind(skeleton, loft)
+    return bind(load_skeleton(growth), loft)
