@@ -214,6 +214,7 @@ STEPS: tuple[Step, ...] = (
     ),
     Step(
         changes=(
+            Added("", {"development": None}),
             *(_renamed_capsule(body) for body in ("body", "team.*.body")),
             *(Added(body, _SIZE) for body in ("body", "team.*.body")),
         )

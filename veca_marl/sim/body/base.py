@@ -137,6 +137,7 @@ class Body(ABC):
         self.name = name
         self._world = world
         self._skeleton = load_skeleton(cfg.growth)
+        self._head_size = self._skeleton.growth.head_size
         self._add_to_scene(SHIRTS[shirt % len(SHIRTS)])
         self._head = self._skeleton.bone("head")
         self.own_head_frames: tuple[int, ...] = (self._skeleton.bone("neck"), self._head)
@@ -144,7 +145,7 @@ class Body(ABC):
         self._palms = np.array([palm_centre(self._skeleton.bones[hand]) for hand in self._hands])
         self._voice = Voice(world.sound.sample_rate_hz)
         self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
-        self._gaze = Gaze(math.radians(cfg.eye_range_deg), self.growth.head_size)
+        self._gaze = Gaze(math.radians(cfg.eye_range_deg), self._head_size)
         self._sight: Sight | None = None
         self._call_pause_s = cfg.call_pause_s
         self.interaction_range_m = cfg.interaction_range_m * self.growth.size
@@ -302,7 +303,7 @@ class Body(ABC):
     def mount(self, name: str) -> Pose:
         """Return the pose of a sense organ, one of `MOUNTS`; eyes look along their x axis."""
         head = Pose(self._drawn.positions[self._head], self._drawn.rotations[self._head])
-        organ = resting_mount(name, head, self.growth.head_size)
+        organ = resting_mount(name, head, self._head_size)
         return self._gaze.turned(name, organ) if name in EYES else organ
 
     def touches(self, prop: Prop) -> bool:

@@ -82,7 +82,8 @@ SNYDER_CM = {
 }
 
 # lengths of the table of bones, metres: with their sum it stands 0.78 m high
-_HEAD_M, _TRUNK_M, _THIGH_M, _SHANK_M, _SOLE_M = 0.135, 0.313, 0.155, 0.135, 0.0415
+_HEAD_M, _TRUNK_M, _THIGH_M, _SHANK_M, _SOLE_M = 0.135, 0.313, 0.155, 0.135, 0.0432
+_HALF_HEAD_M = 0.066  # from the top of the neck to the middle between the ears
 REFERENCE_HEIGHT_M = _HEAD_M + _TRUNK_M + _THIGH_M + _SHANK_M + _SOLE_M
 
 
@@ -146,10 +147,7 @@ class Growth:
     def of(self, bone: str) -> Scale:
         """Return the factors of a bone by name, such as `l_forearm`."""
         part = bone.removeprefix("l_").removeprefix("r_")
-        scale = getattr(self, part) if part in _LIMBS else None
-        if scale is None:
-            scale = self.head if part == "head" else self.trunk if part in _TRUNK else self.hand
-        assert isinstance(scale, Scale)
+        scale: Scale = getattr(self, _GROUPS.get(part, "hand"))  # fingers are of the hand
         return scale
 
     @property
@@ -168,11 +166,10 @@ class Growth:
         return (_THIGH_M * self.thigh.z + _SHANK_M * self.shank.z) / (_THIGH_M + _SHANK_M)
 
     @property
-    def arm(self) -> float:
-        """Factor of the distance from shoulder to wrist."""
-        return (_UPPER_ARM_M * self.upper_arm.z + _FOREARM_M * self.forearm.z) / (
-            _UPPER_ARM_M + _FOREARM_M
-        )
+    def sitting(self) -> float:
+        """Factor of the height of the middle of the head above the hips."""
+        whole_m = _TRUNK_M * self.trunk.z + _HALF_HEAD_M * self.head.z
+        return whole_m / (_TRUNK_M + _HALF_HEAD_M)
 
     @property
     def speed(self) -> float:
@@ -185,9 +182,10 @@ class Growth:
         return 1.0 / self.size
 
 
-_TRUNK = frozenset(("pelvis", "spine", "chest", "neck"))
-_LIMBS = frozenset(("upper_arm", "forearm", "hand", "thigh", "shank", "foot"))
-_UPPER_ARM_M, _FOREARM_M = 0.118, 0.095
+_GROUPS = {
+    **{name: name for name in ("head", "upper_arm", "forearm", "thigh", "shank", "foot")},
+    **dict.fromkeys(("pelvis", "spine", "chest", "neck"), "trunk"),
+}
 REFERENCE = Growth()
 
 

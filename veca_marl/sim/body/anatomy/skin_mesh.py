@@ -2,8 +2,8 @@
 
 Rings of points in the frames of the bones are joined by bands of triangles and closed by caps. The
 rims of thighs and fingers are open; they lie inside pelvis, feet and palms. The right side is the
-mirror image of the left. The numbers are our own design, for the body of 0.78 m; that of a body of
-another size has each vertex scaled in the frame of its bone.
+mirror image of the left. The numbers are our own design, for the body of 0.78 m: that of a body of
+another size has each vertex scaled in the frame of its bone, and follows the same bones.
 """
 
 from __future__ import annotations
@@ -82,25 +82,19 @@ TRUNK_SECTORS, ARM_SECTORS, LEG_SECTORS, FOOT_SECTORS, FINGER_SECTORS = 12, 8, 1
 
 
 class Loft:
-    """Collects vertices, each in the frame of one bone, and triangles, each of one bone.
+    """Collects vertices, each in the frame of one bone, and triangles, each of one bone."""
 
-    Args:
-        skeleton: The table of bones.
-        growth: The size of the body that the vertices are scaled to.
-    """
-
-    def __init__(self, skeleton: Skeleton, growth: Growth = REFERENCE) -> None:
+    def __init__(self, skeleton: Skeleton) -> None:
         self._skeleton = skeleton
-        self._growth = growth
         self.owners: list[int] = []
         self.points: list[Floats] = []
         self.triangles: list[tuple[int, int, int]] = []
         self.triangle_bones: list[int] = []
 
     def point(self, bone: str, point: Sequence[float] | Floats) -> int:
-        """Add a vertex ``(3,)`` in the frame of a bone of 0.78 m, metres; return its number."""
+        """Add a vertex ``(3,)`` in the frame of a bone, metres; return its number."""
         self.owners.append(self._skeleton.bone(bone))
-        self.points.append(np.array(point, float) * self._growth.of(bone).vector)
+        self.points.append(np.array(point, float))
         return len(self.points) - 1
 
     def ring(self, bone: str, points: Floats) -> list[int]:
@@ -277,8 +271,7 @@ def _zone_above_m(skeleton: Skeleton, bone: Bone) -> float:
     parent = skeleton.bones[bone.parent]
     if _continues(parent, bone):
         return _BEND_SHARE * min(_length_m(bone), _length_m(parent))
-    zone_m = _KNUCKLE_ZONE_M if parent.colliders[0].shape is Shape.BOX else _BRANCH_ZONE_M
-    return zone_m * skeleton.growth.of(bone.name).girth
+    return _KNUCKLE_ZONE_M if parent.colliders[0].shape is Shape.BOX else _BRANCH_ZONE_M
 
 
 def _follows(skeleton: Skeleton, owner: int, point: Floats) -> tuple[int, float]:
@@ -298,10 +291,18 @@ def _follows(skeleton: Skeleton, owner: int, point: Floats) -> tuple[int, float]
     return owner, 0.0
 
 
-def bind(skeleton: Skeleton, loft: Loft) -> Mesh:
-    """Return the mesh of a loft, grey, its triangles sorted by bone."""
-    positions, rotations = binding_pose(skeleton)
-    owners, points = np.array(loft.owners), np.array(loft.points)
+def bind(skeleton: Skeleton, loft: Loft, growth: Growth = REFERENCE) -> Mesh:
+    """Return the mesh of a loft, grey, its triangles sorted by bone.
+
+    Args:
+        skeleton: The table of bones, in whose size the loft is.
+        loft: The surface.
+        growth: The size of the mesh.
+    """
+    positions, rotations = binding_pose(load_skeleton(growth))
+    owners = np.array(loft.owners)
+    scales = np.array([growth.of(bone.name).vector for bone in skeleton.bones])
+    points = np.array(loft.points) * scales[owners]
     others = [_follows(skeleton, o, p) for o, p in zip(loft.owners, loft.points, strict=True)]
     frames = np.stack([owners, [bone for bone, _ in others]], axis=1)
     share = np.array([share for _, share in others])
@@ -319,16 +320,16 @@ def bind(skeleton: Skeleton, loft: Loft) -> Mesh:
 
 
 def load_skin(growth: Growth = REFERENCE) -> Mesh:
-    """Return the skin of a size, grey, its triangles sorted by bone (once per process)."""
+    """Return the skin of a size, grey, its triangles sorted by bone (made once per process)."""
     return _skin(growth)
 
 
 @functools.cache
 def _skin(growth: Growth) -> Mesh:
     skeleton = load_skeleton()
-    loft = Loft(skeleton, growth)
+    loft = Loft(skeleton)
     loft_trunk(loft)
     first_vertex, first_triangle = len(loft.points), len(loft.triangles)
     loft_left_side(loft, skeleton)
     loft.mirror(first_vertex, first_triangle)
-    return bind(load_skeleton(growth), loft)
+    return bind(skeleton, loft, growth)
