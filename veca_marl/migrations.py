@@ -99,8 +99,8 @@ class Renamed(Change):
     beside: str | None = None
 
     def apply(self, node: Plain) -> None:
-        """See `Change`."""
-        if self.beside is None or self.beside in node:
+        """See `Change`; a node that has the new name already stays as it is."""
+        if self.now not in node and (self.beside is None or self.beside in node):
             _rename(node, self.before, self.now)
 
     def undo(self, node: Plain) -> None:
