@@ -133,3 +133,21 @@ def test_a_checkpoint_of_a_newer_version_is_refused(tmp_path):
     torch.save({**content, KEY: CONFIG_VERSION + 1}, path)
     with pytest.raises(CheckpointError, match=naming(path.name, f"{KEY}={CONFIG_VERSION + 1}")):
         read_checkpoint(path, torch.device("cpu"))
+
+
+def test_the_height_of_a_capsule_made_way_for_that_of_the_body():
+    old = {"body": {"push_limit_kg": 5.0, "height_m": 0.6}, "team": {}}
+    body = migrated(old)["body"]
+    assert body["capsule_height_m"] == 0.6
+    assert body["height_m"] is None
+    assert migrated({"body": {"strength": 1.0}, "team": {}})["body"]["height_m"] is None
+
+
+def test_bodies_of_two_heights_have_two_first_forms():
+    def walker(**size):
+        return {"body": {"push_limit_kg": 5.0, "capsule_height_m": 0.72, **size}, "team": {}}
+
+    forms = [first_form(walker(age_months=None, height_m=height)) for height in (None, 0.6, 0.7)]
+    assert forms[0]["body"]["height_m"] == 0.72
+    assert forms[1] != forms[2]
+    assert forms[1] != forms[0]

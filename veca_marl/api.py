@@ -45,7 +45,11 @@ from veca_marl.runs.training import TrainingResult, run_training
 from veca_marl.runs.video import SAMPLE_RATE_HZ
 
 # `opponent` is the configuration of `GameCfg.script`
-_GAME_ROOTS = {f.name for f in fields(GameCfg)} - {"script"} | {"opponent", "plugins"}
+_GAME_ROOTS = {f.name for f in fields(GameCfg)} - {"script"} | {
+    "development",
+    "opponent",
+    "plugins",
+}
 
 
 class GameChoices(TypedDict, total=False):

@@ -91,18 +91,22 @@ class Renamed(Change):
     Attributes:
         before: Its name before.
         now: Its name since.
+        beside: A field of the nodes that have it, where their type has no name; None for all.
     """
 
     before: str
     now: str
+    beside: str | None = None
 
     def apply(self, node: Plain) -> None:
-        """See `Change`."""
-        _rename(node, self.before, self.now)
+        """See `Change`; a node that has the new name already stays as it is."""
+        if self.now not in node and (self.beside is None or self.beside in node):
+            _rename(node, self.before, self.now)
 
     def undo(self, node: Plain) -> None:
-        """See `Change`."""
-        _rename(node, self.now, self.before)
+        """See `Change`; where the former name now is that of something else, nothing changes."""
+        if self.before not in node:
+            _rename(node, self.now, self.before)
 
 
 def _rename(node: Plain, before: str, now: str) -> None:
@@ -167,6 +171,14 @@ _PPO = {"critic_learning_rate": 1e-3, "credit": "nothing", **_IMITATION}
 _SAC = {"demonstrated": 0.5, **_IMITATION}
 _SPECTRA = {"encoding": "magnitude", "bins": 250}
 
+_SIZE = {"age_months": None, "height_m": None}
+
+
+def _renamed_capsule(body: str) -> Renamed:
+    """Return the change by which the height of walkers' capsules made way for that of bodies."""
+    return Renamed(body, "height_m", "capsule_height_m", beside="push_limit_kg")
+
+
 STEPS: tuple[Step, ...] = (
     Step(
         changes=(
@@ -199,6 +211,13 @@ STEPS: tuple[Step, ...] = (
             Added("learner.*.network", {"agent_identity": False}, name="multisense"),
         ),
         state={"episodes": {}},
+    ),
+    Step(
+        changes=(
+            Added("", {"development": None}),
+            *(_renamed_capsule(body) for body in ("body", "team.*.body")),
+            *(Added(body, _SIZE) for body in ("body", "team.*.body")),
+        )
     ),
 )
 """Entry `n` leads from version `n` to version ``n + 1``."""

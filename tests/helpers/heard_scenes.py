@@ -4,6 +4,7 @@ import numpy as np
 from listening import EAR, RATE, STEP
 from stand_in_worlds import SoundWorld
 
+from veca_marl.sim.body.anatomy import REFERENCE
 from veca_marl.sim.geometry import Pose
 from veca_marl.sim.hearing import AudioCfg, AudioSense
 from veca_marl.sim.sound import Clip, SoundField, buzz, tone
@@ -22,6 +23,7 @@ class Dummy:
 
     teleports = 0
     deaf_to = frozenset()
+    growth = REFERENCE
 
     def __init__(self):
         self.position = np.zeros(3)

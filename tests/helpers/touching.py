@@ -6,7 +6,7 @@ import numpy as np
 from skins import add_body, pose
 from stand_in_worlds import SceneWorld
 
-from veca_marl.sim.body.anatomy import load_skeleton
+from veca_marl.sim.body.anatomy import REFERENCE, Growth, load_skeleton
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
 from veca_marl.sim.touch.touch_sense import overlapping_triangles, unsensed_primitives
@@ -24,6 +24,7 @@ class Named:
 
     name: str
     object_id: int
+    growth: Growth = REFERENCE
 
 
 class Stage:

@@ -22,6 +22,18 @@ from veca_marl.sim.body import MOUNTS
 from veca_marl.sim.body.humanoid import Humanoid
 
 BODIES = sorted(path.stem for path in (conf_dir() / "body").glob("*.yaml"))
+# bodies of other ages, in months
+GROWN = [
+    pytest.param(name, marks=pytest.mark.slow)
+    for name in (
+        "walker@4",
+        "mitten@4",
+        "walker_discrete_voice@8",
+        "full@8",
+        "walker@18",
+        "full@18",
+    )
+]
 SENSES = ("vision", "audio", "touch", "proprioception")
 STEPS = 12
 # actions of each kind, with one and with several parts, for tests that build environments
@@ -35,9 +47,11 @@ ADAPTED = (
 )
 
 
-@pytest.fixture(scope="module", params=BODIES)
+@pytest.fixture(scope="module", params=[*BODIES, *GROWN])
 def cfg(request):
-    game = compose(["+task=ObjectNav", f"body={request.param}"]).game
+    name, _, age = request.param.partition("@")
+    size = [f"development={age}"] if age else []
+    game = compose(["+task=ObjectNav", f"body={name}", *size]).game
     with free_play(game, 2, senses=SENSES) as cfg:
         yield cfg
 

@@ -1,4 +1,4 @@
-"""The tables of the page about the body: proprioception, bones and joints."""
+"""The tables of the page about the body: ages, proprioception, bones and joints."""
 
 from __future__ import annotations
 
@@ -7,9 +7,20 @@ import re
 import numpy as np
 
 from tools.docs_pages.tables import table
-from veca_marl.sim.body.anatomy import limit_sources, load_skeleton
+from veca_marl.sim.body.anatomy import (
+    REFERENCE,
+    Growth,
+    growth_at,
+    limit_sources,
+    load_skeleton,
+)
 from veca_marl.sim.body.proprioception import ProprioceptionQuality, observed_parts, part_slices
+from veca_marl.sim.body.sense_organs import MOUNTS_M
+from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.touch import taxels_of
+from veca_marl.sim.vision.image_filters import acuity_cpd
+
+AGES_MONTHS = (1, 4, 8, 12, 18, 24, 36)
 
 PARTS = {
     "bone_orientations": ("", "forward and up axis of each bone in the heading frame"),
@@ -23,7 +34,12 @@ PARTS = {
 
 def body_page(page: str) -> str:
     """Return the page about the body with its tables as the data have them."""
-    tables = {"proprioception": proprioception_table, "bones": bone_table, "joints": joint_table}
+    tables = {
+        "ages": age_table,
+        "proprioception": proprioception_table,
+        "bones": bone_table,
+        "joints": joint_table,
+    }
     for name, make_table in tables.items():
         region = re.compile(f"(?<=<!-- {name} -->\n).*(?=<!-- /{name} -->)", re.DOTALL)
         page = region.sub("\n".join(["", *make_table(), "", ""]), page)
@@ -40,6 +56,38 @@ def proprioception_table() -> list[str]:
         place = f"{where.start} to {where.stop - 1}"
         rows.append((place, f"`{part}`", unit, meaning, ", ".join(having)))
     return table(("index", "part", "unit", "content", "qualities that have it"), rows)
+
+
+def age_table() -> list[str]:
+    """Return sizes by age, with the present body in the first row."""
+    rows = [_size_row("default", REFERENCE, "an adult's")]
+    for age in AGES_MONTHS:
+        acuity = f"{acuity_cpd(age):.1f}"
+        rows.append(_size_row(f"{age} months", growth_at(float(age)), acuity))
+    columns = (
+        *("size", "height, m", "mass, kg", "head", "eyes: height, distance", "leg"),
+        *("walking, m/s", "knee, N m", "voice", "acuity, cycles/degree"),
+    )
+    return table(columns, rows)
+
+
+def _size_row(name: str, growth: Growth, acuity: str) -> tuple[str, ...]:
+    skeleton = load_skeleton(growth)
+    top, eye = skeleton.bones[skeleton.bone("head")].tip[2], MOUNTS_M["eye_left"]
+    eyes_m = growth.height_m - top + eye[2] * growth.head_size
+    knee = skeleton.joints[skeleton.joint("l_shank", "flexion")]
+    return (
+        name,
+        f"{growth.height_m:.2f}",
+        f"{skeleton.mass_kg:.1f}",
+        f"{growth.head_size:.2f}",
+        f"{eyes_m:.2f} m, {2000.0 * eye[1] * growth.head_size:.0f} mm",
+        f"{growth.leg:.2f}",
+        f"{WalkerCfg().walk_speed_mps * growth.speed:.2f}",
+        f"{knee.torque_nm:.1f}",
+        f"{growth.pitch:.2f}",
+        acuity,
+    )
 
 
 def bone_table() -> list[str]:

@@ -22,6 +22,7 @@ from veca_marl.algos.reporting import LoggerKind
 from veca_marl.algos.selfplay import SelfPlayCfg
 from veca_marl.config.experiment import ExperimentCfg
 from veca_marl.config.overrides import conf_dirs
+from veca_marl.envs.core.development import at_age, check_age
 from veca_marl.envs.core.game_cfg import GameCfg, Script, TeamCfg
 from veca_marl.envs.core.task import TASKS, TaskCfg
 from veca_marl.policy_paths import policy_path
@@ -74,6 +75,8 @@ class Config:
             ``+senses/vision@team.defender.senses.vision=blind``.
         global_state: Whether the environment has the key ``state``, what the simulator knows, for
             ``algo.network.critic=state``.
+        development: Age in months, from 1 to 36, of bodies and senses, see
+            `veca_marl.envs.core.development`; None for the body of 0.78 m with an adult's senses.
         opponent: Teams that do not learn, and what selects their actions: expert, random, idle, or
             the policy of another run: ``opponent.defender=expert``, ``opponent.defender=runs/...``.
         init_from: Teams that start from the parameters of another run (its folder or one of its
@@ -109,6 +112,7 @@ class Config:
     clock: ClockCfg = field(default_factory=ClockCfg)
     team: dict[str, TeamCfg] = field(default_factory=dict)
     global_state: bool = False
+    development: float | None = None
     opponent: dict[str, str] = field(default_factory=dict)
     init_from: dict[str, str] = field(default_factory=dict)
     init_encoders: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -131,6 +135,8 @@ class Config:
     plugins: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        if self.development is not None:
+            check_age(self.development)
         for team, player in self.opponent.items():
             _check_opponent(team, player)
         for sense in sorted(self.senses.unset):  # only in those of a team it means something
@@ -149,7 +155,7 @@ class Config:
     @property
     def game(self) -> GameCfg:
         """The configuration of the environments."""
-        return GameCfg(
+        game = GameCfg(
             self.task,
             self.playground,
             self.body,
@@ -159,6 +165,7 @@ class Config:
             {team: Script(player) for team, player in self.opponent.items() if player in _SCRIPTS},
             self.global_state,
         )
+        return game if self.development is None else at_age(game, self.development)
 
     def check_teams(self) -> None:
         """Check that entries by team name teams of the task, and learning ones where required.

@@ -24,7 +24,9 @@ from veca_marl.plugins import PLUGINS
 from veca_marl.sim.body import BODIES
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
 
-GAME_KEYS = ("body", "clock", "eval", "opponent", "playground", "senses", "task", "team")
+GAME_KEYS = (
+    *("body", "clock", "development", "eval", "opponent", "playground", "senses", "task", "team"),
+)
 """Keys of the root that can be changed when what a run has learnt is played again."""
 
 

@@ -109,10 +109,13 @@ def test_a_separate_finder_has_the_same_share_in_the_reward():
     ("overrides", "parts"),
     [
         (
-            ["body.radius_m=0.6", "body.height_m=1.5"],
+            ["body.radius_m=0.6", "body.capsule_height_m=1.5"],
             ("door", "width_m=1", "seekers_0", "body.radius_m=0.6"),
         ),
-        (["body.height_m=2.2"], ("walls.door_height_m=2", "seekers_0", "body.height_m=2.2")),
+        (
+            ["body.capsule_height_m=2.2"],
+            ("walls.door_height_m=2", "seekers_0", "body.capsule_height_m=2.2"),
+        ),
     ],
 )
 def test_bodies_that_do_not_fit_through_the_doors_are_refused(overrides, parts):

@@ -20,7 +20,7 @@ CFGS = {"walker": WalkerCfg(voice=VoiceKind.calls), "humanoid": HumanoidCfg()}
 class StatueCfg(BodyCfg):
     """Parameters of a body that a plug-in adds."""
 
-    height_m: float = 0.5
+    pedestal_m: float = 0.5
 
 
 class Statue(Body):
@@ -101,9 +101,9 @@ def test_a_plug_in_adds_a_body_that_acts_and_calls(statue):
 
 
 def test_the_body_of_a_plug_in_is_a_choice_of_the_configuration(statue):
-    cfg = compose(["+task=ObjectNav", "body=statue", "body.height_m=0.7"]).game.body
+    cfg = compose(["+task=ObjectNav", "body=statue", "body.pedestal_m=0.7"]).game.body
     assert type(cfg) is StatueCfg
-    assert cfg.height_m == 0.7
+    assert cfg.pedestal_m == 0.7
 
 
 def test_two_bodies_of_one_configuration_are_refused():

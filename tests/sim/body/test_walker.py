@@ -351,8 +351,8 @@ def test_an_unknown_kind_of_action_is_refused_with_the_choices():
 
 
 def test_a_capsule_must_be_higher_than_wide():
-    with pytest.raises(ValueError, match="height_m"):
-        WalkerCfg(radius_m=0.5, height_m=0.6)
+    with pytest.raises(ValueError, match="capsule_height_m"):
+        WalkerCfg(radius_m=0.5, capsule_height_m=0.6)
     with pytest.raises(ValueError, match="radius_m"):
         WalkerCfg(radius_m=0.0)
 

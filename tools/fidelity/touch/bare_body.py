@@ -15,7 +15,7 @@ from typing import cast
 import numpy as np
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.body.anatomy import forward_kinematics, load_skeleton
+from veca_marl.sim.body.anatomy import REFERENCE, Growth, forward_kinematics, load_skeleton
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.geometry import (
     Bools,
@@ -42,6 +42,7 @@ class _Named:
 
     name: str
     object_id: int
+    growth: Growth = REFERENCE
 
 
 @dataclass

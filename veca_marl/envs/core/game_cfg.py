@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from veca_marl.envs.core.expert import find_expert
-from veca_marl.envs.core.task import TaskCfg, Team, check_body, find_task
+from veca_marl.envs.core.task import TaskCfg, Team, check_body, check_size, find_task
 from veca_marl.sim.body import BodyCfg
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg
@@ -119,12 +119,14 @@ class GameCfg:
         """Check that the task can be played with the bodies of all teams.
 
         Raises:
-            ValueError: If a body is of another kind than it needs, or lacks a verb or a voice.
+            ValueError: If a body is of another kind or size than it needs, or lacks a verb or a
+                voice.
         """
         task = find_task(self.task.name)
         for team in self.teams:
             body = self.body_of(team.name)
             check_body(team.name, body, task.body_cfg, task.verbs, task.needs_voice)
+            check_size(team.name, body.growth, task.ages_months)
 
     def check_playground(self) -> None:
         """Check that the task and all its players fit into the playground.

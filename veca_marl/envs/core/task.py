@@ -14,6 +14,8 @@ import numpy as np
 from veca_marl.registry import Registry
 from veca_marl.sim.body import Body, BodyCfg
 from veca_marl.sim.body.action import VoiceKind
+from veca_marl.sim.body.anatomy import REFERENCE, Growth, growth_at
+from veca_marl.sim.body.anatomy.growth import OLDEST_MONTHS, YOUNGEST_MONTHS
 from veca_marl.sim.body.humanoid import Humanoid, HumanoidCfg
 from veca_marl.sim.body.walker import Walker, WalkerCfg
 from veca_marl.sim.geometry import Floats
@@ -63,6 +65,33 @@ def check_body(
         raise ValueError(
             f"{owner}: this task needs the verbs {list(verbs)}, which reach nothing with "
             f"body.interaction_range_m={body.interaction_range_m}"
+        )
+
+
+def check_size(owner: str, growth: Growth, ages_months: tuple[float, float] | None) -> None:
+    """Check that a task can be played with a body of a size.
+
+    Args:
+        owner: The team or the player, for the message.
+        growth: The size.
+        ages_months: See `Task.ages_months`.
+
+    Raises:
+        ValueError: If it cannot.
+    """
+    if growth == REFERENCE:
+        return
+    if ages_months is None:
+        raise ValueError(
+            f"{owner}: this task is for the body of 0.78 m, this one is {growth.height_m:.3g} m "
+            "high: its distances and objects do not grow with the body yet; leave out "
+            "development, body.age_months and body.height_m"
+        )
+    least, most = (growth_at(age).height_m for age in ages_months)
+    if not least <= growth.height_m <= most:
+        raise ValueError(
+            f"{owner}: this task is for bodies from {ages_months[0]:g} to {ages_months[1]:g} "
+            f"months, {least:.3g} to {most:.3g} m high; this one is {growth.height_m:.3g} m high"
         )
 
 
@@ -215,6 +244,8 @@ class Task(ABC):
         senses: Senses of the players.
         body_cfg: Class of the parameters of the bodies that can play it: `WalkerCfg`,
             `HumanoidCfg`, or `BodyCfg` for any.
+        ages_months: Least and greatest age of the size of the bodies that can play it; None if
+            that is only the body of 0.78 m. The rules of such a task do not fit other sizes.
         verbs: Choices of the action part `verb` that it needs.
         needs_voice: Whether it needs the action part `voice`, with which bodies call.
         rates: Names of the reward terms that are earned as long as a state lasts, such as a speed
@@ -231,6 +262,7 @@ class Task(ABC):
     teams: ClassVar[tuple[Team, ...]] = (Team("agents"),)
     senses: ClassVar[tuple[str, ...]] = ()
     body_cfg: ClassVar[type[BodyCfg]] = BodyCfg
+    ages_months: ClassVar[tuple[float, float] | None] = (YOUNGEST_MONTHS, OLDEST_MONTHS)
     verbs: ClassVar[tuple[str, ...]] = ()
     needs_voice: ClassVar[bool] = False
     rates: ClassVar[tuple[str, ...]] = ()

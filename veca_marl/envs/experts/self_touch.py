@@ -13,7 +13,6 @@ from veca_marl.envs.core.task import Player
 from veca_marl.envs.experts.control.arm_kinematics import ArmKinematics, Palms
 from veca_marl.envs.experts.control.posture_transitions import KeyPoses
 from veca_marl.envs.tasks.self_touch import SelfTouch
-from veca_marl.sim.body.anatomy import load_skeleton
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry import Floats
 
@@ -79,7 +78,7 @@ class SelfTouchExpert(Expert[SelfTouch]):
         self._arms = ArmKinematics(task.body)
         self._step_s = task.world.clock.step_s
         self._legs = KeyPoses(task.body, _LEGS, self._step_s)
-        bones = load_skeleton().bones
+        bones = task.body.skeleton.bones
         self._centres = {b.name: np.array(b.colliders[0].pose.position) for b in bones}
 
     def reset(self) -> None:

@@ -19,6 +19,7 @@ from veca_marl.envs.tasks.floors.places import (
     planned_furniture,
 )
 from veca_marl.envs.tasks.floors.playability import check_placement
+from veca_marl.sim.body.anatomy.growth import OLDEST_MONTHS
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.geometry import Floats, rotation_about_vertical
 from veca_marl.sim.physics import (
@@ -200,6 +201,7 @@ class BabyzumasRevenge(Task):
 
     senses: ClassVar[tuple[str, ...]] = ("vision", "audio")
     body_cfg = WalkerCfg
+    ages_months = (6.0, OLDEST_MONTHS)  # smaller ones do not see into the drawer
     verbs = ("grab", "open")
     cfg: BabyzumasRevengeCfg
 

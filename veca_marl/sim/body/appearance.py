@@ -20,16 +20,17 @@ SHIRTS = ((0.20, 0.40, 0.90), (0.90, 0.30, 0.20), (0.20, 0.75, 0.30), (0.90, 0.8
 
 _CLOTHED = {"spine": "shirt", "chest": "shirt", "upper_arm": "shirt"}
 _CLOTHED |= {"pelvis": "trousers", "thigh": "trousers", "shank": "trousers", "foot": "shoes"}
+_PUPIL_M = 0.012  # radius of what is drawn
 # hair is behind and above this plane in the head's frame: n . x = d, metres
 _HAIRLINE_NORMAL, _HAIRLINE_M = np.array([-0.6, 0.0, 0.8]), 0.048
 
 
 def dressed_skin(skeleton: Skeleton, shirt: tuple[float, float, float]) -> Mesh:
     """Return the skin mesh with the colours of clothes and hair."""
-    mesh = load_skin()
+    mesh = load_skin(skeleton.growth)
     by_bone = np.array([_colour(bone, shirt) for bone in skeleton.bones], np.float32)
     colours = by_bone[mesh.owners]
-    colours[_hairy(mesh, skeleton.bone("head"))] = HAIR
+    colours[_hairy(mesh, skeleton.bone("head"), skeleton.growth.head_size)] = HAIR
     return replace(mesh, colours=colours)
 
 
@@ -43,17 +44,26 @@ def bone_geoms(skeleton: Skeleton, shirt: tuple[float, float, float]) -> list[li
         [_geom(part, bone, _colour(bone, shirt)) for part in bone.colliders]
         for bone in skeleton.bones
     ]
-    frames[skeleton.bone("head")] += [
-        Geom(Shape.SPHERE, (0.012,), MOUNTS_M[eye], colour=PUPILS, tangible=False) for eye in EYES
-    ]
+    size = skeleton.growth.head_size
+    for eye in EYES:
+        x, y, z = MOUNTS_M[eye]
+        pupil = Geom(
+            Shape.SPHERE,
+            (_PUPIL_M * size,),
+            (x * size, y * size, z * size),
+            colour=PUPILS,
+            tangible=False,
+        )
+        frames[skeleton.bone("head")].append(pupil)
     return frames
 
 
-def _hairy(mesh: Mesh, head: int) -> NDArray[np.bool_]:
+def _hairy(mesh: Mesh, head: int, head_size: float) -> NDArray[np.bool_]:
     """Return a mask ``(T,)`` of the triangles that have the colour of hair."""
     on_head = np.where(mesh.frames[:, :1] == head, mesh.offsets[:, 0], mesh.offsets[:, 1])
     centres = on_head[mesh.triangles].mean(axis=1)
-    hairy: NDArray[np.bool_] = (mesh.owners == head) & (centres @ _HAIRLINE_NORMAL > _HAIRLINE_M)
+    above = centres @ _HAIRLINE_NORMAL > _HAIRLINE_M * head_size
+    hairy: NDArray[np.bool_] = (mesh.owners == head) & above
     return hairy
 
 

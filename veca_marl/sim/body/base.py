@@ -17,7 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import VOICE, Action, VoiceKind, checked_action, voice_spec
-from veca_marl.sim.body.anatomy import bone_motion, load_skeleton
+from veca_marl.sim.body.anatomy import (
+    REFERENCE,
+    Growth,
+    Skeleton,
+    bone_motion,
+    growth_at,
+    growth_of_height,
+    load_skeleton,
+)
 from veca_marl.sim.body.appearance import SHIRTS, bone_geoms, dressed_skin
 from veca_marl.sim.body.sense_organs import (
     EYES,
@@ -45,16 +53,24 @@ class BodyCfg:
         call_pause_s: Silence after each call, at most 60 s. No other call can begin meanwhile, and
             other sounds of the mouth wait.
         interaction_range_m: Objects can be interacted with if their distance from the head is
-            smaller. The paper's main text has 1.5 m, its table of functions 2.5 m.
+            smaller. The paper's main text has 1.5 m, its table of functions 2.5 m. It is in
+            proportion to the height of the body: this is for one of 0.78 m.
+        age_months: Size of a child of this age, from 1 to 36; see `Growth`. None is the body of
+            0.78 m. All lengths, speeds and masses of a configuration are for that body, and those
+            of another size are in proportion.
+        height_m: Standing height, in place of an age: the size of the age at which it is the
+            median, from 0.5415 to 0.9557.
     """
 
     eye_range_deg: float = 50.0
     voice: VoiceKind = VoiceKind.silent
     call_pause_s: float = 0.0
     interaction_range_m: float = 1.5
+    age_months: float | None = None
+    height_m: float | None = None
 
     def __post_init__(self) -> None:
-        """Check that all numbers are finite and not negative."""
+        """Check that all numbers are finite and not negative, and the size."""
         self._check_choices(voice=VoiceKind)
         for name, value in vars(self).items():
             if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
@@ -63,6 +79,23 @@ class BodyCfg:
             raise ValueError(f"body.eye_range_deg={self.eye_range_deg} must be below 90")
         if self.call_pause_s > 60.0:
             raise ValueError(f"body.call_pause_s={self.call_pause_s} must be at most 60")
+        _ = self.growth
+
+    @property
+    def growth(self) -> Growth:
+        """The size of the body.
+
+        Raises:
+            ValueError: If both age and height are given, or one is outside the tables.
+        """
+        if self.age_months is not None and self.height_m is not None:
+            raise ValueError(
+                f"body.age_months={self.age_months} and body.height_m={self.height_m}: "
+                "give one of them"
+            )
+        if self.age_months is not None:
+            return growth_at(self.age_months)
+        return REFERENCE if self.height_m is None else growth_of_height(self.height_m)
 
     def _check_choices(self, **kinds: type[Enum]) -> None:
         """Raise `ValueError` for a field that is no member of its enumeration."""
@@ -97,7 +130,7 @@ class Body(ABC):
             it stays as it is for the life of the world.
         joint_names: The 82 joints, such as `l_forearm.flexion`, in the order of all joint arrays.
         bone_names: The 47 bones, such as `l_forearm`, in the order of all bone arrays.
-        interaction_range_m: See `BodyCfg`.
+        interaction_range_m: See `BodyCfg`; that of this body.
     """
 
     cfg_type: ClassVar[type[BodyCfg]]
@@ -106,7 +139,8 @@ class Body(ABC):
     def __init__(self, name: str, cfg: BodyCfg, world: World, shirt: int = 0) -> None:
         self.name = name
         self._world = world
-        self._skeleton = load_skeleton()
+        self._skeleton = load_skeleton(cfg.growth)
+        self._head_size = self._skeleton.growth.head_size
         self._add_to_scene(SHIRTS[shirt % len(SHIRTS)])
         self._head = self._skeleton.bone("head")
         self.own_head_frames: tuple[int, ...] = (self._skeleton.bone("neck"), self._head)
@@ -114,10 +148,10 @@ class Body(ABC):
         self._palms = np.array([palm_centre(self._skeleton.bones[hand]) for hand in self._hands])
         self._voice = Voice(world.sound.sample_rate_hz)
         self._mouth = world.sound.add_source(f"{name}.voice", self._voice)
-        self._gaze = Gaze(math.radians(cfg.eye_range_deg))
+        self._gaze = Gaze(math.radians(cfg.eye_range_deg), self._head_size)
         self._sight: Sight | None = None
         self._call_pause_s = cfg.call_pause_s
-        self.interaction_range_m = cfg.interaction_range_m
+        self.interaction_range_m = cfg.interaction_range_m * self.growth.size
         self.joint_names = tuple(f"{j.bone}.{j.label}" for j in self._skeleton.joints)
         self.bone_names = tuple(bone.name for bone in self._skeleton.bones)
         joints = len(self._skeleton.joints)
@@ -139,6 +173,16 @@ class Body(ABC):
     def world(self) -> World:
         """The world in which it is."""
         return self._world
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """Its bones and joints. It must not be changed."""
+        return self._skeleton
+
+    @property
+    def growth(self) -> Growth:
+        """Its size."""
+        return self._skeleton.growth
 
     @property
     @abstractmethod
@@ -268,7 +312,7 @@ class Body(ABC):
     def mount(self, name: str) -> Pose:
         """Return the pose of a sense organ, one of `MOUNTS`; eyes look along their x axis."""
         head = Pose(self._drawn.positions[self._head], self._drawn.rotations[self._head])
-        organ = resting_mount(name, head)
+        organ = resting_mount(name, head, self._head_size)
         return self._gaze.turned(name, organ) if name in EYES else organ
 
     def touches(self, prop: Prop) -> bool:
@@ -377,7 +421,7 @@ class Body(ABC):
         """
         if call is not Call.none and not self._voice.speaking:
             rate_hz = self._world.sound.sample_rate_hz
-            self._voice.say(call_waveform(CALLS[call], rate_hz))
+            self._voice.say(call_waveform(CALLS[call].pitched(self.growth.pitch), rate_hz))
             self._voice.say(np.zeros(round(self._call_pause_s * rate_hz)))
 
     # ---- visible and interactable objects (the paper's API)

@@ -1,9 +1,10 @@
 """Where the sense organs are, and what a body knows of its own eyes.
 
-Positions of the organs are those of a child of about one year, in the frame of the head bone
-(origin at the top of the neck). The interpupillary distance of 45 mm and the head breadth of 128 mm
-are of the order that anthropometry reports for that age (quoted from memory, not checked against a
-table); the rest follows from the head of our skeleton.
+Positions of the organs are those of the body of 0.78 m, a child of about 15 months, in the frame of
+the head bone (origin at the top of the neck). The interpupillary distance of 45 mm and the head
+breadth of 128 mm are of the order that anthropometry reports for that age (quoted from memory, not
+checked against a table); the rest follows from the head of our skeleton. On a body of another size
+they are `Growth.head_size` times as far from the top of the neck.
 
 Bodies are below vision in the order of imports. `veca_marl.sim.senses.make_senses` gives each body
 its sight, see `Body.sight`.
@@ -33,8 +34,13 @@ MOUNTS = tuple(MOUNTS_M)
 EYES = ("eye_left", "eye_right")
 
 
-def resting_mount(name: str, head: Pose) -> Pose:
+def resting_mount(name: str, head: Pose, head_size: float = 1.0) -> Pose:
     """Return the pose of an organ whose axes are the head's.
+
+    Args:
+        name: One of `MOUNTS`.
+        head: Pose of the head bone.
+        head_size: `Growth.head_size` of the body.
 
     Raises:
         KeyError: If there is no such organ; the message lists those that exist.
@@ -43,7 +49,7 @@ def resting_mount(name: str, head: Pose) -> Pose:
         offset = MOUNTS_M[name]
     except KeyError:
         raise KeyError(f"no mount {name!r}; there are {list(MOUNTS_M)}") from None
-    return Pose(head.position + head.rotation @ np.array(offset), head.rotation)
+    return Pose(head.position + head.rotation @ (np.array(offset) * head_size), head.rotation)
 
 
 class Gaze:
@@ -51,14 +57,15 @@ class Gaze:
 
     Args:
         range_rad: Largest rotation of the eyes in the head.
+        head_size: `Growth.head_size` of the body.
 
     Attributes:
         point: ``(3,)`` metres in the world frame; None when the eyes look straight ahead.
         focal_distance_m: To which the lenses are adjusted; ``inf`` when relaxed.
     """
 
-    def __init__(self, range_rad: float) -> None:
-        self._range_rad = range_rad
+    def __init__(self, range_rad: float, head_size: float = 1.0) -> None:
+        self._range_rad, self._head_size = range_rad, head_size
         self.relax()
 
     def relax(self) -> None:
@@ -83,7 +90,8 @@ class Gaze:
         """Return the pose of an eye, given its name and its pose when it looks straight ahead."""
         if self.point is None:
             return eye
-        return aimed(eye, self.point, self._range_rad, MOUNTS_M[name][1])
+        aside_m = MOUNTS_M[name][1] * self._head_size
+        return aimed(eye, self.point, self._range_rad, aside_m)
 
 
 def aimed(eye: Pose, point: Floats, range_rad: float, aside_m: float = 0.0) -> Pose:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol
 
@@ -277,7 +277,8 @@ class AudioCfg:
         head_scale: Size of the head relative to the measured one, from 0.5 to 1.5: spectral
             features are at ``1 / head_scale`` times their frequency, interaural times and the
             distance of the ears `head_scale` times as long (Middlebrooks 1999). KEMAR is an adult
-            (diameter 0.175 m); 0.733 gives the 0.128 m between the ears of the bodies.
+            (diameter 0.175 m); 0.733 gives the 0.128 m between the ears of the body of 0.78 m. On a
+            body of another size it is in proportion to the head.
         window: See `Window`.
         noise_floor_db: Level of the receiver's own noise relative to an rms pressure of 1 (-80,
             for example), or None. Its expected power is added, so that nothing becomes random.
@@ -342,7 +343,7 @@ class AudioSense(Sense):
         self._centre, nearest_m = _centre_of_ears(body), _mouth_to_ears_m(body)
         self._steps_in_window = math.ceil(WINDOW_SAMPLES / field.step_samples)
         self._listener = field.add_listener(
-            make_receiver(cfg, field.sample_rate_hz, nearest_m),
+            make_receiver(_on_head(cfg, body), field.sample_rate_hz, nearest_m),
             self._steps_in_window,
             body.deaf_to,
         )
@@ -396,6 +397,22 @@ class AudioSense(Sense):
         if n < size:
             self._recent[:, :-n] = self._recent[:, n:]
         self._recent[:, -n:] = waveform[:, -size:]
+
+
+def _on_head(cfg: AudioCfg, body: Body) -> AudioCfg:
+    """Return the settings for the head of a body.
+
+    Raises:
+        ValueError: If no receiver is so small or so large.
+    """
+    size = body.growth.head_size
+    try:
+        return replace(cfg, head_scale=cfg.head_scale * size)
+    except ValueError as error:
+        raise ValueError(
+            f"senses.audio.head_scale={cfg.head_scale} on a head of {size:.3g} times the size of "
+            f"that of the body of 0.78 m: {error}"
+        ) from None
 
 
 def _centre_of_ears(body: Body) -> Floats:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
@@ -218,6 +218,12 @@ class CallCfg:
         check_level(self.level)
         if not 2.0 * _FADE_S < self.length_s <= 5.0:
             raise ValueError(f"length_s={self.length_s} must be above {2.0 * _FADE_S}, at most 5")
+
+    def pitched(self, factor: float) -> CallCfg:
+        """Return the call of a voice whose frequencies are higher by a factor."""
+        if factor == 1.0:
+            return self
+        return replace(self, begin_hz=factor * self.begin_hz, end_hz=factor * self.end_hz)
 
 
 class Call(IntEnum):

@@ -14,7 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy import Bone, binding_pose, load_skeleton, load_skin
+from veca_marl.sim.body.anatomy import (
+    REFERENCE,
+    Bone,
+    Growth,
+    Skeleton,
+    binding_pose,
+    load_skeleton,
+    load_skin,
+)
 from veca_marl.sim.geometry import (
     Bools,
     Floats,
@@ -41,7 +49,8 @@ BARYCENTRIC = np.array(
 PATCH_TRIANGLES = 4
 TAXELS_PER_TRIANGLE = len(BARYCENTRIC)
 _ITERATIONS, _RELAXATION = 12, 0.7
-# limits of the shift in metres: over gaps between bones the mesh has no physical skin below it
+# limits of the shift in metres, of the body of 0.78 m: over gaps between bones the mesh has no
+# physical skin below it
 _FARTHEST_OUT_M, _FARTHEST_IN_M = -0.004, 0.012
 
 
@@ -77,17 +86,24 @@ class TaxelTable(NamedTuple):
     layers: Floats
 
 
+def load_taxels(growth: Growth = REFERENCE) -> TaxelTable:
+    """Return the taxels of a body of a size (made once per process; the result is read-only).
+
+    Number and order of the taxels are the same for all sizes.
+    """
+    return _taxels(growth)
+
+
 @functools.cache
-def load_taxels() -> TaxelTable:
-    """Return the taxels of the skin (once per process; the result is read-only)."""
-    skeleton, mesh = load_skeleton(), load_skin()
+def _taxels(growth: Growth) -> TaxelTable:
+    skeleton, mesh = load_skeleton(growth), load_skin(growth)
     count = len(skeleton.bones)
     first_triangle = np.searchsorted(mesh.owners, np.arange(count + 1))
     starts = [np.arange(*ends, PATCH_TRIANGLES) for ends in pairwise(first_triangle)]
     patches = np.append(np.concatenate(starts), first_triangle[-1])
     own = [np.unique(mesh.triangles[first:end]) for first, end in pairwise(patches)]
-    corners = _bound_corners(mesh)
-    depths = _depths(mesh, corners)
+    corners = _bound_corners(mesh, skeleton)
+    depths = _depths(mesh, corners, skeleton)
     low, high = depths.min(axis=1), depths.max(axis=1)
     return TaxelTable(
         triangles=np.ascontiguousarray(mesh.triangles),
@@ -118,7 +134,7 @@ def taxels_of(bone_name: str) -> slice:
 
 def bound_triangles() -> tuple[Floats, Floats]:
     """Return centroids and normals ``(T, 3)`` of the triangles in the binding pose."""
-    corners = _bound_corners(load_skin())
+    corners = _bound_corners(load_skin(), load_skeleton())
     centroids: Floats = corners.mean(axis=1)
     return centroids, _normals(corners)
 
@@ -150,17 +166,16 @@ def _normals(corners: Floats) -> Floats:
     return normals
 
 
-def _bound_corners(mesh: Mesh) -> Floats:
+def _bound_corners(mesh: Mesh, skeleton: Skeleton) -> Floats:
     """Return the corners ``(T, 3, 3)`` of the triangles in the binding pose, metres."""
     bound = with_mesh(empty_meshes(), mesh, 0)
-    deform_meshes(bound, *binding_pose(load_skeleton()))
+    deform_meshes(bound, *binding_pose(skeleton))
     corners: Floats = bound.vertices[mesh.triangles]
     return corners
 
 
-def _depths(mesh: Mesh, corners: Floats) -> Floats:
+def _depths(mesh: Mesh, corners: Floats, skeleton: Skeleton) -> Floats:
     """Return the depths ``(T, 6)`` of the physical skin below the mesh, in the binding pose."""
-    skeleton = load_skeleton()
     positions, rotations = binding_pose(skeleton)
     points, normals = _on_triangles(corners), _normals(corners)
     depths = np.zeros(points.shape[:2])
@@ -168,17 +183,18 @@ def _depths(mesh: Mesh, corners: Floats) -> Floats:
         own = mesh.owners == index
         local = (points[own] - positions[index]) @ rotations[index]
         inward = -(normals[own] @ rotations[index])[:, None]
-        depths[own] = _march_to_skin(bone, local, inward)
+        depths[own] = _march_to_skin(bone, local, inward, skeleton.growth.of(bone.name).girth)
     return depths
 
 
-def _march_to_skin(bone: Bone, points: Floats, inward: Floats) -> Floats:
+def _march_to_skin(bone: Bone, points: Floats, inward: Floats, girth: float) -> Floats:
     """Find how far points lie above the skin of a bone, by relaxed sphere tracing.
 
     Args:
         bone: The bone.
         points: ``(t, 6, 3)`` metres in its frame.
         inward: ``(t, 1, 3)`` unit direction of the search.
+        girth: Of the bone, relative to the body of 0.78 m.
 
     Returns:
         ``(t, 6)`` metres, clipped where the search does not reach the skin.
@@ -188,7 +204,7 @@ def _march_to_skin(bone: Bone, points: Floats, inward: Floats) -> Floats:
         height = distance_to_bone(bone, points + depth[..., None] * inward) - bone.skin_thickness_m
         depth = depth + _RELAXATION * height
     typical = 0.5 * float(np.median(distance_to_bone(bone, points)))
-    return depth.clip(_FARTHEST_OUT_M, typical + _FARTHEST_IN_M)
+    return depth.clip(_FARTHEST_OUT_M * girth, typical + _FARTHEST_IN_M * girth)
 
 
 def distance_to_bone(bone: Bone, points: Floats) -> Floats:

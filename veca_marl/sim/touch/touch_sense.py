@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body import Body
-from veca_marl.sim.body.anatomy import Skeleton, binding_pose, load_skeleton
+from veca_marl.sim.body.anatomy import REFERENCE, Growth, Skeleton, binding_pose, load_skeleton
 from veca_marl.sim.body.appearance import SKIN, bone_geoms, dressed_skin
 from veca_marl.sim.body.humanoid.articulation import may_collide
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Scene, SceneObject
@@ -55,16 +55,21 @@ def unsensed_primitives(geoms: GeomTable, body: SceneObject) -> Bools:
     return ignored
 
 
-@functools.cache
-def overlapping_triangles(share: float) -> Bools:
+def overlapping_triangles(share: float, growth: Growth = REFERENCE) -> Bools:
     """Return the mask ``(T,)`` of triangles that read their own body in the binding pose.
 
     In that pose arms and legs are spread, and no part of the body is in contact with another.
 
     Args:
         share: Radius of the receptive fields as a share of `TaxelTable.gaps`.
+        growth: Size of the body.
     """
-    skeleton, taxels, scene = load_skeleton(), load_taxels(), Scene()
+    return _overlapping(share, growth)
+
+
+@functools.cache
+def _overlapping(share: float, growth: Growth) -> Bools:
+    skeleton, taxels, scene = load_skeleton(growth), load_taxels(growth), Scene()
     body = scene.add_object("body", bone_geoms(skeleton, SKIN), dressed_skin(skeleton, SKIN))
     body.positions[:], body.rotations[:] = binding_pose(skeleton)
     scene.update()
@@ -147,11 +152,11 @@ class TouchSense(Sense):
         super().__init__(world)
         self._scene = world.scene
         self._object = world.scene.objects[body.object_id]
-        self._taxels = load_taxels()
+        self._taxels = load_taxels(body.growth)
         self._transform = make_transform(cfg.quality, cfg.binary_above)
         bones, vertices = len(self._taxels.thickness), self._object.vertices
         self._ignored: Bools = np.zeros((bones, 0), np.bool_)
-        points = overlapping_triangles(cfg.receptive_field)
+        points = overlapping_triangles(cfg.receptive_field, body.growth)
         self._fields = fields_of(self._taxels, cfg.receptive_field, body.object_id, points)
         self._own = rigid_bones(self._scene.geoms, self._object, bones)
         self._workspace = empty_workspace(self._taxels, vertices.stop - vertices.start, 0)

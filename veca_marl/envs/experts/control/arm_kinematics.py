@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy import Skeleton, forward_kinematics, load_skeleton
+from veca_marl.sim.body.anatomy import Skeleton, forward_kinematics
 from veca_marl.sim.body.humanoid import Humanoid
 from veca_marl.sim.geometry import Floats
 
@@ -50,7 +50,7 @@ class ArmKinematics:
     ) -> None:
         self._body = body
         self._max_change_rad, self._direction_m = max_change_rad, direction_m
-        self._skeleton: Skeleton = load_skeleton()
+        self._skeleton: Skeleton = body.skeleton
         bones = self._skeleton.bones
         arms = [self._skeleton.bone(f"{side}_{bone}") for side in _SIDES for bone in _ARM]
         self.joints = [
@@ -60,6 +60,8 @@ class ArmKinematics:
         ]
         self._hands = [self._skeleton.bone(f"{side}_hand") for side in _SIDES]
         joints = [self._skeleton.joints[joint] for joint in self.joints]
+        hand = body.growth.hand
+        self._along_m, self._out_m = _PALM_M * hand.z, _THICKNESS_M * hand.girth
         self._low = np.array([joint.low_rad for joint in joints])
         self._high = np.array([joint.high_rad for joint in joints])
 
@@ -113,7 +115,7 @@ class ArmKinematics:
         hands = rotations[self._hands]
         fingers = -hands[:, :, 2]
         normals = np.einsum("hij,hj->hi", hands, _INWARD)
-        points = positions[self._hands] + _PALM_M * fingers + _THICKNESS_M * normals
+        points = positions[self._hands] + self._along_m * fingers + self._out_m * normals
         return Palms(points, normals, fingers)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from veca_marl.sim.body.anatomy import forward_kinematics, load_skeleton
+from veca_marl.sim.body.anatomy import forward_kinematics
 from veca_marl.sim.body.humanoid import SATURATION_RAD, Humanoid, JointActionKind
 from veca_marl.sim.body.humanoid.postures import Posture
 from veca_marl.sim.geometry import Floats
@@ -48,7 +48,7 @@ class SeatedBalance:
         bent: Posture,
         gain_per_s: float = 0.75,
     ) -> None:
-        self._body, self._skeleton = body, load_skeleton()
+        self._body, self._skeleton = body, body.skeleton
         self.upright, self._bent = body.posture_angles(upright), body.posture_angles(bent)
         bones = self._skeleton.bones
         inertias = [bone.inertia() for bone in bones]

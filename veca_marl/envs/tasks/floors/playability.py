@@ -146,10 +146,10 @@ def _check(playground: PlaygroundCfg, body: Walker) -> None:
                 f"{body.name} with body.radius_m={body.cfg.radius_m:g} does not fit through it"
             )
     walls = playground.walls
-    if playground.doors and walls is not None and walls.door_height_m <= body.cfg.height_m:
+    if playground.doors and walls is not None and walls.door_height_m <= body.cfg.capsule_height_m:
         raise ValueError(
             f"playground {playground.name!r}: walls.door_height_m={walls.door_height_m:g} is too "
-            f"low for {body.name} with body.height_m={body.cfg.height_m:g}"
+            f"low for {body.name} with body.capsule_height_m={body.cfg.capsule_height_m:g}"
         )
 
 

@@ -25,7 +25,7 @@ _TOES_M = np.array([0.07, 0.0, -0.043])
 
 @dataclass
 class RunBabyCfg(StartCfg):
-    """Parameters of RunBaby.
+    """Parameters of RunBaby. Heights are for the body of 0.78 m and grow with the body.
 
     Attributes:
         spread_deg: Standard deviation of every joint angle at the start about the posture
@@ -83,6 +83,10 @@ class RunBaby(PosedStart):
 
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
+        growth = self.body.growth
+        self._fallen_m = self.cfg.fallen_m * growth.size
+        self._kneeling_m = self.cfg.kneeling_m * growth.shank.z
+        self._toes_in_foot_m = _TOES_M * growth.foot.vector
         self._chest = ForwardProgress(self.world.clock.step_s, self.cfg.top_mps)
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -108,16 +112,16 @@ class RunBaby(PosedStart):
         return {"forward": self._speed_mps}
 
     def terminated(self) -> bool:
-        return self._height_m("neck") < self.cfg.fallen_m or self._kneels()
+        return self._height_m("neck") < self._fallen_m or self._kneels()
 
     def _toes_m(self) -> Floats:
         """Return the positions of the left and the right toes along the heading at the start."""
         feet = [self.body.bone(name) for name in _FEET]
-        toes = np.array([foot.position + foot.rotation @ _TOES_M for foot in feet])
+        toes = np.array([foot.position + foot.rotation @ self._toes_in_foot_m for foot in feet])
         return np.array(toes @ self._heading)
 
     def _kneels(self) -> bool:
-        return min(map(self._height_m, _SHANKS)) < self.cfg.kneeling_m
+        return min(map(self._height_m, _SHANKS)) < self._kneeling_m
 
     def _height_m(self, bone: str) -> float:
         return float(self.body.bone(bone).position[2])

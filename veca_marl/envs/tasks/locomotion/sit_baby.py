@@ -21,7 +21,7 @@ from veca_marl.sim.body.humanoid.postures import POSTURES
 
 @dataclass
 class SitBabyCfg(StartCfg):
-    """Parameters of SitBaby.
+    """Parameters of SitBaby. Heights are for the body of 0.78 m and grow with the body.
 
     Attributes:
         starts: Weights of the postures in which episodes start, by name. Other postures than
@@ -91,20 +91,24 @@ class SitBaby(PosedStart):
 
     def build(self) -> None:
         self.body = require_humanoid(self.players[0])
+        growth = self.body.growth
+        self._torso_m = self.cfg.torso_m * growth.trunk.z
+        self._head_m = self.cfg.head_m * growth.sitting
+        self._seat_m = self.cfg.seat_m * growth.size
 
     def reset(self, rng: np.random.Generator) -> None:
         posture = draw_posture(self.cfg.starts, rng)
         start_anywhere(self.world, self.body, posture, self.cfg.spread_deg, rng)
 
     def reward(self, player: Player) -> dict[str, float]:
-        torso = clipped_share(self.body.bone("neck").position[2], self.cfg.torso_m)
-        head = clipped_share(self.body.mount("head").position[2], self.cfg.head_m)
+        torso = clipped_share(self.body.bone("neck").position[2], self._torso_m)
+        head = clipped_share(self.body.mount("head").position[2], self._head_m)
         upright = self._uprightness()
         return {"torso": upright * torso, "head": upright * head}
 
     def solved(self, player: Player) -> bool:
         """Return whether the body sits upright."""
-        sits = self.body.bone("pelvis").position[2] < self.cfg.seat_m
+        sits = self.body.bone("pelvis").position[2] < self._seat_m
         return bool(sits) and min(self.reward(player).values()) >= self.cfg.sat
 
     def _uprightness(self) -> float:

@@ -68,6 +68,7 @@ class GrabObject(Task):
     senses = ("vision", "touch", "proprioception")
     rates = ("effort",)
     body_cfg = HumanoidCfg
+    ages_months = None  # positions and sizes of things are for these arms and hands
     cfg: GrabObjectCfg
 
     @classmethod

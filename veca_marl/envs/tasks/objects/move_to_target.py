@@ -79,6 +79,7 @@ class MoveToTarget(Task):
 
     senses = ("vision", "touch", "proprioception")
     body_cfg = HumanoidCfg
+    ages_months = None  # positions and sizes of things are for these arms and hands
     cfg: MoveToTargetCfg
 
     @classmethod

@@ -88,6 +88,7 @@ class PileUpBlock(Task):
     senses = ("vision", "touch", "proprioception")
     rates = ("height",)
     body_cfg = HumanoidCfg
+    ages_months = None  # positions and sizes of things are for these arms and hands
     cfg: PileUpBlockCfg
 
     @classmethod

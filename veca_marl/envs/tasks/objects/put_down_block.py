@@ -98,6 +98,7 @@ class PutDownBlock(Task):
     senses = ("vision", "touch", "proprioception")
     rates = ("height",)
     body_cfg = HumanoidCfg
+    ages_months = None  # positions and sizes of things are for these arms and hands
     cfg: PutDownBlockCfg
 
     @classmethod

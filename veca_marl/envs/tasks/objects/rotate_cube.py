@@ -98,6 +98,7 @@ class RotateCube(Task):
 
     senses = ("touch", "proprioception")
     body_cfg = HumanoidCfg
+    ages_months = None  # positions and sizes of things are for these arms and hands
     cfg: RotateCubeCfg
 
     @classmethod

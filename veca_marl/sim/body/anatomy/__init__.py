@@ -1,5 +1,6 @@
 """The skeleton, its kinematics, its skin mesh and its URDF."""
 
+from veca_marl.sim.body.anatomy.growth import REFERENCE, Growth, growth_at, growth_of_height
 from veca_marl.sim.body.anatomy.kinematics import (
     Soles,
     Underside,
@@ -19,9 +20,11 @@ from veca_marl.sim.body.anatomy.skin_mesh import binding_pose, load_skin
 from veca_marl.sim.body.anatomy.urdf import BodyFiles, Build, body_files, bone_of
 
 __all__ = [
+    "REFERENCE",
     "BodyFiles",
     "Bone",
     "Build",
+    "Growth",
     "Joint",
     "Skeleton",
     "SkinLayer",
@@ -33,6 +36,8 @@ __all__ = [
     "bone_motion",
     "bone_of",
     "forward_kinematics",
+    "growth_at",
+    "growth_of_height",
     "is_finger",
     "limit_sources",
     "load_skeleton",

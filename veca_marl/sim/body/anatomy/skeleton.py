@@ -1,5 +1,7 @@
 """The skeleton: 47 bones and 82 hinges, read from `data/bones.csv` and `data/dofs.csv`.
 
+The tables are a body of 0.78 m. `load_skeleton` scales them to another size, see `Growth`.
+
 Zero angles are the neutral standing posture: arms hanging, palms to the thighs. The frame of the
 pelvis is the base.
 """
@@ -10,12 +12,13 @@ import csv
 import functools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.sim.body.anatomy.growth import REFERENCE, Growth, Scale
 from veca_marl.sim.geometry import (
     Floats,
     Inertia,
@@ -96,6 +99,7 @@ class Skeleton:
         rest_rotations: ``(47, 3, 3)`` orientations in the parents' frames at zero angles.
         joint_axes: ``(82, 3)`` unit vectors in the frames of the bones.
         joint_slices: ``(47, 2)`` first joint of each bone, and the one after its last.
+        growth: Its size.
     """
 
     bones: tuple[Bone, ...]
@@ -105,6 +109,12 @@ class Skeleton:
     rest_rotations: Floats
     joint_axes: Floats
     joint_slices: NDArray[np.int64]
+    growth: Growth = REFERENCE
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of the whole body."""
+        return sum(bone.mass_kg for bone in self.bones)
 
     def bone(self, name: str) -> int:
         """Return the index of a bone; raise `KeyError` with the names that exist."""
@@ -127,11 +137,18 @@ _CAPSULE = re.compile(r"capsule a=\((.+?)\) b=\((.+?)\) r=(\S+)")
 _BOX = re.compile(r"box c=\((.+?)\) half=\((.+?)\)")
 
 
+def load_skeleton(growth: Growth = REFERENCE) -> Skeleton:
+    """Return the skeleton of a size, made once per process. It must not be changed."""
+    return _skeleton(growth)
+
+
 @functools.cache
-def load_skeleton() -> Skeleton:
-    """Return the skeleton, read once per process. It must not be changed."""
+def _skeleton(growth: Growth) -> Skeleton:
     joints = _joints()
     bones = _bones(joints)
+    if growth != REFERENCE:
+        joints = tuple(_grown_joint(joint, growth.of(joint.bone)) for joint in joints)
+        bones = _grown_bones(bones, growth)
     return Skeleton(
         bones=bones,
         joints=joints,
@@ -140,7 +157,56 @@ def load_skeleton() -> Skeleton:
         rest_rotations=np.array([bone.rest_rotation for bone in bones]),
         joint_axes=np.array([joint.axis for joint in joints]),
         joint_slices=np.array([(b.first_joint, b.first_joint + b.joint_count) for b in bones]),
+        growth=growth,
     )
+
+
+def _grown_joint(joint: Joint, scale: Scale) -> Joint:
+    """Return a joint with the torque of a bone of another volume."""
+    return replace(joint, torque_nm=joint.torque_nm * scale.volume)
+
+
+def _grown_bones(bones: tuple[Bone, ...], growth: Growth) -> tuple[Bone, ...]:
+    """Return the bones of another size; they have the mass of the whole body together."""
+    volumes = [growth.of(bone.name).volume for bone in bones]
+    whole_kg = sum(bone.mass_kg * volume for bone, volume in zip(bones, volumes, strict=True))
+    density = 1.0 if growth.mass_kg is None else growth.mass_kg / whole_kg
+    return tuple(
+        _grown_bone(bone, bones[max(bone.parent, 0)].name, growth, density * bone.mass_kg * volume)
+        for bone, volume in zip(bones, volumes, strict=True)
+    )
+
+
+def _grown_bone(bone: Bone, parent: str, growth: Growth, mass_kg: float) -> Bone:
+    """Return a bone of another size.
+
+    Its joint lies in the frame of its parent and moves with that. The pressure that presses skin
+    down to the bone is that of the table, so that its force follows the area.
+    """
+    scale = growth.of(bone.name)
+    return replace(
+        bone,
+        origin=_scaled(bone.origin, growth.of(parent)),
+        tip=_scaled(bone.tip, scale),
+        mass_kg=mass_kg,
+        skin_thickness_m=scale.girth * bone.skin_thickness_m,
+        skin_force_n=scale.girth**2 * bone.skin_force_n,
+        colliders=tuple(_grown_collider(part, scale) for part in bone.colliders),
+    )
+
+
+def _scaled(point: tuple[float, float, float], scale: Scale) -> tuple[float, float, float]:
+    return point[0] * scale.x, point[1] * scale.y, point[2] * scale.z
+
+
+def _grown_collider(part: Primitive, scale: Scale) -> Primitive:
+    """Return a collider of another size: a box, or a capsule with another radius."""
+    if part.shape is Shape.BOX:
+        x, y, z = part.size
+        offset = np.asarray(part.offset) * scale.vector
+        return Primitive(Shape.BOX, _scaled((x, y, z), scale), offset=offset)
+    low, high = (end * scale.vector for end in part.cap_centres())
+    return capsule_between(low, high, part.radius * scale.girth)
 
 
 def _vector(text: str) -> tuple[float, float, float]:

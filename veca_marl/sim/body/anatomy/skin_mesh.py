@@ -2,7 +2,8 @@
 
 Rings of points in the frames of the bones are joined by bands of triangles and closed by caps. The
 rims of thighs and fingers are open; they lie inside pelvis, feet and palms. The right side is the
-mirror image of the left. The numbers are our own design.
+mirror image of the left. The numbers are our own design, for the body of 0.78 m: that of a body of
+another size has each vertex scaled in the frame of its bone, and follows the same bones.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from veca_marl.sim.body.anatomy.growth import REFERENCE, Growth
 from veca_marl.sim.body.anatomy.kinematics import forward_kinematics
 from veca_marl.sim.body.anatomy.skeleton import Bone, Skeleton, load_skeleton
 from veca_marl.sim.geometry import Floats, Mesh, Shape
@@ -289,10 +291,18 @@ def _follows(skeleton: Skeleton, owner: int, point: Floats) -> tuple[int, float]
     return owner, 0.0
 
 
-def bind(skeleton: Skeleton, loft: Loft) -> Mesh:
-    """Return the mesh of a loft, grey, its triangles sorted by bone."""
-    positions, rotations = binding_pose(skeleton)
-    owners, points = np.array(loft.owners), np.array(loft.points)
+def bind(skeleton: Skeleton, loft: Loft, growth: Growth = REFERENCE) -> Mesh:
+    """Return the mesh of a loft, grey, its triangles sorted by bone.
+
+    Args:
+        skeleton: The table of bones, in whose size the loft is.
+        loft: The surface.
+        growth: The size of the mesh.
+    """
+    positions, rotations = binding_pose(load_skeleton(growth))
+    owners = np.array(loft.owners)
+    scales = np.array([growth.of(bone.name).vector for bone in skeleton.bones])
+    points = np.array(loft.points) * scales[owners]
     others = [_follows(skeleton, o, p) for o, p in zip(loft.owners, loft.points, strict=True)]
     frames = np.stack([owners, [bone for bone, _ in others]], axis=1)
     share = np.array([share for _, share in others])
@@ -309,13 +319,17 @@ def bind(skeleton: Skeleton, loft: Loft) -> Mesh:
     )
 
 
+def load_skin(growth: Growth = REFERENCE) -> Mesh:
+    """Return the skin of a size, grey, its triangles sorted by bone (made once per process)."""
+    return _skin(growth)
+
+
 @functools.cache
-def load_skin() -> Mesh:
-    """Return the skin of the skeleton, grey, its triangles sorted by bone (once per process)."""
+def _skin(growth: Growth) -> Mesh:
     skeleton = load_skeleton()
     loft = Loft(skeleton)
     loft_trunk(loft)
     first_vertex, first_triangle = len(loft.points), len(loft.triangles)
     loft_left_side(loft, skeleton)
     loft.mirror(first_vertex, first_triangle)
-    return bind(skeleton, loft)
+    return bind(skeleton, loft, growth)

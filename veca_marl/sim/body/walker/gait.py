@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.body.anatomy import Skeleton
+from veca_marl.sim.body.anatomy import Growth, Skeleton
 from veca_marl.sim.geometry import Floats
 
 _ROUNDING_RAD = 1e-9
@@ -135,7 +135,7 @@ _STANCE = 0.5  # fraction of the stride in which a foot is on the floor
 
 
 class GaitCfg(NamedTuple):
-    """Parameters of the gait.
+    """Parameters of the gait of the body of 0.78 m; `of_size` gives those of another.
 
     Attributes:
         step_m: Distance that a foot in stance moves back relative to the hip at full stride.
@@ -172,6 +172,20 @@ class GaitCfg(NamedTuple):
     settle_s: float = 0.08
     kick_s: float = 0.36
     blend_s: float = 0.08
+
+    def of_size(self, growth: Growth) -> GaitCfg:
+        """Return the gait of a body of another size: lengths follow the legs, speeds their root."""
+        leg = growth.leg
+        return self._replace(
+            step_m=self.step_m * leg,
+            step_centre_m=self.step_centre_m * leg,
+            full_stride_mps=self.full_stride_mps * growth.speed,
+            turning_m=self.turning_m * leg,
+            leg_m=self.leg_m * leg,
+            sink_m=self.sink_m * leg,
+            bob_m=self.bob_m * leg,
+            lift_m=self.lift_m * leg,
+        )
 
 
 # the kicking leg: fraction of the kick, flexion of thigh and knee (rad); the strike comes first,
@@ -352,7 +366,7 @@ class Gait:
 
     Args:
         skeleton: The table of bones and joints.
-        cfg: Parameters; the defaults if None.
+        cfg: Parameters; the defaults, for the size of the skeleton, if None.
 
     Attributes:
         phase: Of the stride, in [0, 1).
@@ -362,7 +376,7 @@ class Gait:
     """
 
     def __init__(self, skeleton: Skeleton, cfg: GaitCfg | None = None) -> None:
-        self.cfg = cfg or GaitCfg()
+        self.cfg = cfg or GaitCfg().of_size(skeleton.growth)
         self._legs = measure_legs(skeleton)
         self._neck = Neck(skeleton)
         self._low = np.array([j.low_rad for j in skeleton.joints])

@@ -97,7 +97,7 @@ class CrawlPose:
 
     Attributes:
         pitch_deg: Pitch of the pelvis.
-        pelvis_back_m: Distance of the pelvis behind the middle of the body.
+        pelvis_back_m: Distance of the pelvis behind the middle of the body, of the body of 0.78 m.
         neck_deg: Extension of neck and head together with which the eyes look ahead.
         swing_deg: Amplitude of arms and thighs at full stride.
     """
@@ -155,6 +155,7 @@ class OnAllFours:
         low_rad, high_rad = self._neck.pitch_range_rad
         extended_rad = self._extended_rad = math.radians(self._pose.neck_deg)
         self.pitch_range_rad = low_rad + extended_rad, high_rad + extended_rad
+        self._back_m = self._pose.pelvis_back_m * skeleton.growth.size
         self._level_rad = -math.radians(self._pose.pitch_deg)
 
     def turn(self, yaw_rad: float) -> None:
@@ -166,7 +167,7 @@ class OnAllFours:
         c, s = math.cos(yaw_rad), math.sin(yaw_rad)
         pitch = math.radians(self._pose.pitch_deg)
         cp, sp = math.cos(pitch), math.sin(pitch)
-        back = self._pose.pelvis_back_m
+        back = self._back_m
         rotation = np.array([[c * cp, -s, c * sp], [s * cp, c, s * sp], [-sp, 0.0, cp]])
         return np.array([ground[0] - back * c, ground[1] - back * s, 0.0]), rotation
 
@@ -207,7 +208,9 @@ def make_stances(
         cfg: Its parameters.
         world: The world.
     """
-    upright = upright_capsule(world, cfg.radius_m, cfg.height_m, cfg.push_limit_kg, cfg.restitution)
+    upright = upright_capsule(
+        world, cfg.radius_m, cfg.capsule_height_m, cfg.push_limit_kg, cfg.restitution
+    )
     standing = Upright(skeleton, gait, upright)
     if Crawl.name not in cfg.verbs:
         return standing, None

@@ -28,7 +28,7 @@ from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.ground_motion import Footsteps, GroundMotion
 from veca_marl.sim.body.walker.handling import ObjectHandling
 from veca_marl.sim.body.walker.stances import BonePoses, make_stances
-from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps
+from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps, sized
 from veca_marl.sim.body.walker.walker_collisions import Footprint, walker_collisions
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import Prop, World
@@ -43,6 +43,7 @@ class Walker(Body):
     """A body that moves at commanded velocities. See `Body` for the common methods.
 
     Attributes:
+        cfg: Its parameters, in proportion to its size.
         verb_choice: The chosen verb and its result.
     """
 
@@ -50,7 +51,7 @@ class Walker(Body):
 
     def __init__(self, name: str, cfg: WalkerCfg, world: World, shirt: int = 0) -> None:
         super().__init__(name, cfg, world, shirt)
-        self.cfg = cfg
+        self.cfg = cfg = sized(cfg)
         self._greatest_speed_mps = greatest_speed_mps(cfg, world.clock)
         self._walk_action = WALK_ACTIONS[cfg.action]
         self._gait = Gait(self._skeleton)
@@ -61,8 +62,7 @@ class Walker(Body):
         world.settings.append(self._handling.grip)
         self._bone_poses = BonePoses(self._skeleton, self._drawn)
         self.verb_choice = VerbChoice(cfg.verbs)
-        mass_kg = sum(bone.mass_kg for bone in self._skeleton.bones)
-        self._footsteps = Footsteps(name, mass_kg, world)
+        self._footsteps = Footsteps(name, self._skeleton.mass_kg, world)
         self._posed_on_m = 0.0  # height of the surface for which the bones are posed
         self.reset()
         walker_collisions(world).add(self)

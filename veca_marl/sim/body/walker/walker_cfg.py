@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from veca_marl.sim.body.anatomy import REFERENCE, Growth, load_skeleton
 from veca_marl.sim.body.base import BodyCfg
 from veca_marl.sim.body.walker.actions import WalkActionKind
 from veca_marl.sim.physics import ClockCfg
@@ -14,6 +15,9 @@ from veca_marl.sim.physics.interactions import check_interactions
 class WalkerCfg(BodyCfg):
     """Parameters of the walking body. The paper does not give them; the values are ours.
 
+    Lengths, speeds, masses and impulses are those of the body of 0.78 m. A body of another age or
+    height has them in proportion, see `sized`.
+
     Attributes:
         action: Continuous velocities or discrete moves.
         walk_speed_mps: Speed of a full forward action; see `greatest_speed_mps` for its limit.
@@ -21,7 +25,7 @@ class WalkerCfg(BodyCfg):
             [0, 1].
         turn_speed_degps: Turning speed of a full turn action.
         radius_m: Radius of the capsule in the physics.
-        height_m: Height of the capsule.
+        capsule_height_m: Height of the capsule.
         push_limit_kg: Props up to this mass are light: they are pushed, kicked and carried. Heavier
             ones stop the walker.
         restitution: 0 (nothing rebounds from the body) to 1 (things rebound as from the floor);
@@ -50,7 +54,7 @@ class WalkerCfg(BodyCfg):
     backward_share: float = 0.3
     turn_speed_degps: float = 120.0
     radius_m: float = 0.11
-    height_m: float = 0.72
+    capsule_height_m: float = 0.72
     push_limit_kg: float = 5.0
     restitution: float = 0.0
     kick_reach_m: float = 0.15
@@ -71,9 +75,9 @@ class WalkerCfg(BodyCfg):
         """Check the choices, the numbers, the verbs, and that the capsule is higher than wide."""
         self._check_choices(action=WalkActionKind)
         super().__post_init__()
-        if not 0.0 < 2.0 * self.radius_m <= self.height_m:
+        if not 0.0 < 2.0 * self.radius_m <= self.capsule_height_m:
             raise ValueError(
-                f"body.radius_m={self.radius_m}, body.height_m={self.height_m}: "
+                f"body.radius_m={self.radius_m}, body.capsule_height_m={self.capsule_height_m}: "
                 "the radius must be positive and at most half the height"
             )
         if not 0.0 < self.crawl_height_m < self.crawl_length_m:
@@ -86,6 +90,42 @@ class WalkerCfg(BodyCfg):
             if getattr(self, name) > 1.0:
                 raise ValueError(f"body.{name}={getattr(self, name)} is not in [0, 1]")
         check_interactions("body.verbs", self.verbs)
+
+
+def sized(cfg: WalkerCfg) -> WalkerCfg:
+    """Return the parameters of a body of the size that a configuration asks for.
+
+    Reach and heights of the feet follow the legs, speeds the root of that (`Growth.speed`), the
+    capsule the trunk and the height, masses the mass, impulses mass times speed. Turning speeds and
+    angles are those of the configuration.
+
+    Args:
+        cfg: For the body of 0.78 m.
+    """
+    growth = cfg.growth
+    if growth == REFERENCE:
+        return cfg
+    mass, leg, speed = _mass_ratio(growth), growth.leg, growth.speed
+    return replace(
+        cfg,
+        walk_speed_mps=cfg.walk_speed_mps * speed,
+        radius_m=cfg.radius_m * growth.trunk.girth,
+        capsule_height_m=cfg.capsule_height_m * growth.size,
+        push_limit_kg=cfg.push_limit_kg * mass,
+        kick_reach_m=cfg.kick_reach_m * leg,
+        kick_height_m=cfg.kick_height_m * leg,
+        kick_speed_mps=cfg.kick_speed_mps * speed,
+        kick_impulse_ns=cfg.kick_impulse_ns * mass * speed,
+        stride_height_m=cfg.stride_height_m * leg,
+        step_height_m=cfg.step_height_m * leg,
+        step_reach_m=cfg.step_reach_m * leg,
+        crawl_height_m=cfg.crawl_height_m * growth.size,
+        crawl_length_m=cfg.crawl_length_m * growth.size,
+    )
+
+
+def _mass_ratio(growth: Growth) -> float:
+    return load_skeleton(growth).mass_kg / load_skeleton().mass_kg
 
 
 def greatest_speed_mps(cfg: WalkerCfg, clock: ClockCfg) -> float:
