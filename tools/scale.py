@@ -211,7 +211,7 @@ Collection with the network that acts, new parameters before each batch, and lea
 
 In the column *in the learner's process* is the work that more cores do not divide: to receive a
 batch and put it together, and to learn from it. Elapsed times are those of a machine with this
-load by other programs; processor times hardly depend on it.
+load by other programs; processor times depend on it less, by a quarter between runs.
 
 ## Traffic of a frame
 

@@ -2,9 +2,9 @@
 
 One process plays rounds: rude actions in every task, then a short training run with worker
 processes. After each round it counts its memory, open files, processes, shared memory and the
-processor time of a step. Beside it, another process gives random content to the parsers, then tries
-random configurations until the time is over. The figures go to a page, docs/reliability.md; the
-exit status is 1 if anything grew or failed.
+processor time of a step, in units of a fixed workload. Beside it, a second process gives random
+content to the parsers, and a third one tries random configurations. The figures go to a page,
+docs/reliability.md; the exit status is 1 if anything grew or failed.
 
     python -m tools.soak minutes=60 to=docs/reliability.md
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import gc
 import json
+import math
 import os
 import random
 import signal
@@ -33,6 +34,7 @@ from tools.checkout import check_imported
 from tools.soak_page import Configurations, Parsers, Sample, Soak, page
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.bench.command import machine_line
+from veca_marl.bench.rollouts import ReferenceWorkload
 from veca_marl.config import ConfigError, compose
 from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.envs.core.episodes import Episodes
@@ -43,6 +45,7 @@ _HELPERS = _ROOT / "tests" / "helpers"
 _STEPS = 70  # of each task in a round
 _OBSERVED_EVERY = 5
 _CONFIGURATION_S = 120
+_BESIDE = ("parsers", "configurations")
 _SHARED_MEMORY = Path("/dev/shm")
 _RUN = (
     *("collect.processes=2", "collect.worlds=1", "collect.steps=16", "task.max_seconds=0.5"),
@@ -58,7 +61,8 @@ class SoakOptions:
         minutes: How long.
         seed: Chooses actions and configurations.
         to: File of the page.
-        part: ``all``, or ``beside`` for what runs beside the worlds: it prints its results.
+        part: ``all``, or what runs beside the worlds and prints its results: ``parsers``,
+            ``configurations``.
     """
 
     minutes: float = 60.0
@@ -69,8 +73,8 @@ class SoakOptions:
     def __post_init__(self) -> None:
         if not self.minutes > 0:
             raise ValueError(f"minutes must be positive, got {self.minutes}")
-        if self.part not in ("all", "beside"):
-            raise ValueError(f"part={self.part}: choices: all, beside")
+        if self.part not in ("all", *_BESIDE):
+            raise ValueError(f"part={self.part}: choices: all, {', '.join(_BESIDE)}")
 
 
 class Worlds:
@@ -89,20 +93,21 @@ class Worlds:
         self._rng = np.random.default_rng(seed)
         self._rude = import_module("rude_actions").rude_actions
         self._inspection = import_module("inspection")
+        self._workload = ReferenceWorkload()
         self.actions = 0
         self.problems: list[str] = []
 
     def round(self, number: int) -> float:
-        """Play some steps of every task; return the processor time of a step, in ms."""
-        seconds, steps = 0.0, 0
+        """Play some steps of every task; return the processor time of one, in workloads."""
+        ratios = []
         for task in veca_marl.list_tasks():
             game = Game(compose([f"+task={task}"]).game)
             try:
-                seconds += self._play(game, task, number)
+                step_ms = 1e3 * self._play(game, task, number) / _STEPS
+                ratios.append(step_ms / self._workload.run_ms())
             finally:
                 game.close()
-            steps += _STEPS
-        return 1e3 * seconds / steps
+        return math.fsum(ratios) / len(ratios)
 
     def _play(self, game: Game, task: str, number: int) -> float:
         episodes, done, seconds = Episodes(seed=self._seed + number), True, 0.0
@@ -122,7 +127,7 @@ class Worlds:
         return seconds
 
 
-def sample(minutes: float, step_ms: float, actions: int) -> Sample:
+def sample(minutes: float, step: float, actions: int) -> Sample:
     """Return what this process and its children take now."""
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
@@ -132,7 +137,7 @@ def sample(minutes: float, step_ms: float, actions: int) -> Sample:
         files=len(os.listdir("/proc/self/fd")),
         processes=len(list(_children())),
         shared_mb=sum(file.stat().st_size for file in _own_shared_files()) / 1e6,
-        step_ms=step_ms,
+        step=step,
         actions=actions,
     )
 
@@ -155,7 +160,7 @@ def play_rounds(minutes: float, seed: int) -> tuple[list[Sample], list[str]]:
     begin = time.monotonic()
     while (time.monotonic() - begin) / 60.0 < minutes or len(samples) < 3:
         number = len(samples)
-        step_ms = worlds.round(number)
+        step = worlds.round(number)
         task = veca_marl.list_tasks()[number % len(veca_marl.list_tasks())]
         try:
             with TemporaryDirectory() as folder:
@@ -169,14 +174,14 @@ def play_rounds(minutes: float, seed: int) -> tuple[list[Sample], list[str]]:
         except (RuntimeError, ValueError) as error:
             worlds.problems.append(f"round {number}, training {task}: {error}")
         elapsed = (time.monotonic() - begin) / 60.0
-        samples.append(sample(elapsed, step_ms, worlds.actions))
+        samples.append(sample(elapsed, step, worlds.actions))
         print(samples[-1], file=sys.stderr, flush=True)
     return samples, worlds.problems
 
 
 def try_parsers(minutes: float) -> Parsers:
     """Run the tests of the parsers with many examples."""
-    examples = round(20 + 5 * minutes)
+    examples = round(10 + 2 * minutes)
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-n", "0", "-q", "tests/parsers"],
         cwd=_ROOT,
@@ -185,7 +190,9 @@ def try_parsers(minutes: float) -> Parsers:
         text=True,
         check=False,
     )
-    lines = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    # what failed, and the examples with which it did
+    marks = ("FAILED", "ERROR", "E   ")
+    lines = [line for line in done.stdout.splitlines() if line.startswith(marks)][:40]
     if done.returncode and not lines:
         lines = done.stdout.splitlines()[-3:]
     return Parsers(examples, done.stdout.splitlines()[-1] if done.stdout else "", lines)
@@ -214,6 +221,11 @@ def _too_long(*_: object) -> None:
     raise TimeoutError(f"more than {_CONFIGURATION_S} s")
 
 
+def _start(*words: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "tools.soak", *words]
+    return subprocess.Popen(command, cwd=_ROOT, stdout=subprocess.PIPE, text=True)
+
+
 def run(options: SoakOptions, overrides: list[str]) -> None:
     """Do what was asked for.
 
@@ -226,24 +238,25 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
         raise ConfigError(f"{overrides[0]}: soak plays default configurations only")
     torch.set_num_threads(1)
     sys.path.insert(0, str(_HELPERS))
-    if options.part == "beside":
+    if options.part == "parsers":
+        print(json.dumps(asdict(try_parsers(options.minutes))))
+        return
+    if options.part == "configurations":
         until = time.monotonic() + 60.0 * options.minutes
-        parsers = try_parsers(options.minutes)
-        configurations = try_configurations(until, options.seed)
-        print(json.dumps([asdict(parsers), asdict(configurations)]))
+        print(json.dumps(asdict(try_configurations(until, options.seed))))
         return
     file = check_file(options.to, "to")
     line = machine_line()
-    words = [f"minutes={options.minutes}", f"seed={options.seed}", "part=beside"]
-    beside = subprocess.Popen(
-        [sys.executable, "-m", "tools.soak", *words], cwd=_ROOT, stdout=subprocess.PIPE, text=True
-    )
+    words = [f"minutes={options.minutes}", f"seed={options.seed}"]
+    beside = [_start(*words, f"part={part}") for part in _BESIDE]
     try:
         samples, problems = play_rounds(options.minutes, options.seed)
-        printed, _ = beside.communicate()
+        parsers, configurations = (
+            json.loads(one.communicate()[0].splitlines()[-1]) for one in beside
+        )
     finally:
-        beside.kill()
-    parsers, configurations = json.loads(printed.splitlines()[-1])
+        for one in beside:
+            one.kill()
     soak = Soak(
         line, samples, problems, Parsers(**parsers), Configurations(**configurations), options.seed
     )

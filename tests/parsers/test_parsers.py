@@ -7,7 +7,7 @@ import msgpack
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from stored_runs import train_tiny
 
@@ -103,6 +103,8 @@ words = st.one_of(
 
 @many
 @given(st.lists(words, max_size=3))
+@example(["hydra.run.dir=~\0"])
+@example(["seed=" + "9" * 5000])
 def test_words_of_a_command_line(words):
     try:
         cfg = compose(["+task=KickTheBall", *words])

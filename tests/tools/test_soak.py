@@ -5,10 +5,8 @@ import pytest
 from tools.soak_page import FLAT, Configurations, Parsers, Sample, Soak, page
 
 
-def soak(*memory_mb, step_ms=3.0, files=20, problems=()):
-    samples = [
-        Sample(float(k), mb, files, 1, 0.0, step_ms, 100 * k) for k, mb in enumerate(memory_mb)
-    ]
+def soak(*memory_mb, step=3.0, files=20, problems=()):
+    samples = [Sample(float(k), mb, files, 1, 0.0, step, 100 * k) for k, mb in enumerate(memory_mb)]
     return Soak("one", samples, list(problems), Parsers(20, "8 passed", []), Configurations(), 0)
 
 

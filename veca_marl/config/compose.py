@@ -132,7 +132,7 @@ def _composed(overrides: Sequence[str], root: str = "config") -> DictConfig:
     try:
         with _own_hydra():
             node: DictConfig = hydra.compose(root, overrides=list(overrides))
-    except (HydraException, OmegaConfBaseException) as error:
+    except (HydraException, OmegaConfBaseException, ValueError) as error:
         raise ConfigError(one_line(error)) from error
     return node
 
@@ -146,12 +146,27 @@ def prepare(overrides: Sequence[str]) -> list[str]:
     Raises:
         ConfigError: If a plug-in cannot be loaded, or a group has another value than a name.
     """
+    _check_readable(overrides)
     load_config_plugins(plugins_in(overrides))
     check_group_values(overrides)
     prepared = normalised(overrides)
     for group in _MAY_BE_NULL:
         _check_parts(group, prepared)
     return prepared
+
+
+_LONGEST_NUMBER = 4300  # digits; Python reads no longer ones
+
+
+def _check_readable(overrides: Sequence[str]) -> None:
+    """Refuse what makes Python fail before Hydra's grammar could refuse it."""
+    for text in overrides:
+        if "\0" in text:
+            raise ConfigError(f"{text!r}: a null character")
+        if re.search(rf"\d{{{_LONGEST_NUMBER + 1}}}", text):
+            raise ConfigError(
+                f"{text.partition('=')[0]}: a number of more than {_LONGEST_NUMBER} digits"
+            )
 
 
 def _check_parts(group: str, overrides: Sequence[str]) -> None:
