@@ -104,6 +104,8 @@ words = st.one_of(
 @many
 @given(st.lists(words, max_size=3))
 @example(["hydra.run.dir=~\0"])
+@example(["+="])
+@example(["task=\n"])
 @example(["seed=" + "9" * 5000])
 def test_words_of_a_command_line(words):
     try:

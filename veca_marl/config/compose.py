@@ -163,6 +163,8 @@ def _check_readable(overrides: Sequence[str]) -> None:
     for text in overrides:
         if "\0" in text:
             raise ConfigError(f"{text!r}: a null character")
+        if not text.strip().lstrip("+~").partition("=")[0].strip():
+            raise ConfigError(f"{text!r} has no key: KEY=VALUE is expected")
         if re.search(rf"\d{{{_LONGEST_NUMBER + 1}}}", text):
             raise ConfigError(
                 f"{text.partition('=')[0]}: a number of more than {_LONGEST_NUMBER} digits"
