@@ -16,6 +16,7 @@ import json
 import math
 import os
 import random
+import resource
 import signal
 import subprocess
 import sys
@@ -39,6 +40,7 @@ from veca_marl.config import ConfigError, compose
 from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
+from veca_marl.processes.children import end_of
 
 _ROOT = Path(__file__).parents[1]
 _HELPERS = _ROOT / "tests" / "helpers"
@@ -46,6 +48,7 @@ _STEPS = 70  # of each task in a round
 _OBSERVED_EVERY = 5
 _CONFIGURATION_S = 120
 _BESIDE = ("parsers", "configurations")
+_LARGEST_BYTES = 8 * 2**30  # address space of what tries configurations: others use the memory too
 _SHARED_MEMORY = Path("/dev/shm")
 _RUN = (
     *("collect.processes=2", "collect.worlds=1", "collect.steps=16", "task.max_seconds=0.5"),
@@ -201,11 +204,13 @@ def try_parsers(minutes: float) -> Parsers:
 def try_configurations(until: float, seed: int) -> Configurations:
     """Try random configurations until a time of `time.monotonic`."""
     drawn = import_module("random_configurations")
+    resource.setrlimit(resource.RLIMIT_AS, (_LARGEST_BYTES, _LARGEST_BYTES))
     signal.signal(signal.SIGALRM, _too_long)
     found = Configurations()
     while time.monotonic() < until:
         number = 1_000_000 * (seed + 1) + found.tried
         words = drawn.draw(random.Random(number))
+        print(*words, flush=True)  # the last line names what has ended this process
         signal.alarm(_CONFIGURATION_S)
         try:
             found.refused += drawn.refusal(words, number) is not None
@@ -251,15 +256,21 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
     beside = [_start(*words, f"part={part}") for part in _BESIDE]
     try:
         samples, problems = play_rounds(options.minutes, options.seed)
-        parsers, configurations = (
-            json.loads(one.communicate()[0].splitlines()[-1]) for one in beside
-        )
+        printed = [one.communicate()[0].splitlines() for one in beside]
     finally:
         for one in beside:
             one.kill()
-    soak = Soak(
-        line, samples, problems, Parsers(**parsers), Configurations(**configurations), options.seed
-    )
+    parsers = Parsers(0, "", [])
+    configurations = Configurations()
+    for part, process, lines in zip(_BESIDE, beside, printed, strict=True):
+        if process.returncode:
+            at = f" at: {lines[-1]}" if lines else ""
+            problems.append(f"the process of the {part} {end_of(process.returncode)}{at}")
+        elif part == "parsers":
+            parsers = Parsers(**json.loads(lines[-1]))
+        else:
+            configurations = Configurations(**json.loads(lines[-1]))
+    soak = Soak(line, samples, problems, parsers, configurations, options.seed)
     write_atomically(Path(file), page(soak))
     print(f"page: {file}")
     if soak.faults:
