@@ -4,10 +4,11 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 ARGS   ?=
 CORES  ?= 2
+MINUTES ?= 60
 # moves every seed of `make test-all`, another one each day; the tests print it
 SEED_OFFSET ?= $(shell date +%y%j)
 
-.PHONY: help train test test-all checks lint types kernels format bench fidelity performance docs pages wheel clean
+.PHONY: help train test test-all checks lint types kernels format bench fidelity performance soak docs pages wheel clean
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -64,6 +65,9 @@ fidelity: $(VENV)/installed-test ## measure the laws of physics and senses; rewr
 
 performance: $(VENV)/installed ## measure rates and the cost of training; rewrite docs/performance.md
 	$(BIN)/python -m tools.performance to=docs/performance.md $(ARGS)
+
+soak: $(VENV)/installed-test ## play for an hour and look whether anything grows: MINUTES=10; rewrite docs/reliability.md
+	OMP_NUM_THREADS=1 $(BIN)/python -m tools.soak minutes=$(MINUTES) to=docs/reliability.md $(ARGS)
 
 docs: $(VENV)/installed-test ## build the documentation site in docs/_build/html
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs docs/_build/html $(ARGS)

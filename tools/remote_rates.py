@@ -107,11 +107,11 @@ def in_turns(here: Player, there: Player, steps: int, rounds: int) -> str:
     works: tuple[list[float], list[float]] = ([], [])
     for number in range(rounds + 1):
         for play, wall, work in zip((here, there), walls, works, strict=True):
-            before = _processor_s()
+            before = processor_s()
             seconds = [_seconds(play) for _ in range(steps)]
             if number:  # the first round warms up
                 wall += seconds
-                work.append((_processor_s() - before) / steps)
+                work.append((processor_s() - before) / steps)
     columns = {
         "wall time, lower quartile": [np.percentile(one, 25) for one in walls],
         "wall time, median": [np.percentile(one, 50) for one in walls],
@@ -125,7 +125,7 @@ def in_turns(here: Player, there: Player, steps: int, rounds: int) -> str:
     return "\n".join(["", *lines])
 
 
-def _processor_s() -> float:
+def processor_s() -> float:
     """Return the processor time that this process and all it has started have used (Linux)."""
     nanoseconds = 0
     for process in [os.getpid(), *_descendants(os.getpid())]:

@@ -141,7 +141,7 @@ def _composed(overrides: Sequence[str], root: str = "config") -> DictConfig:
         if any(text.lstrip("+~").startswith("hydra") for text in overrides):
             return _by_hydra(root, tuple(overrides))  # it may name further sources
         return _composed_once(root, tuple(overrides), state_of_sources())
-    except (HydraException, OmegaConfBaseException) as error:
+    except (HydraException, OmegaConfBaseException, ValueError) as error:
         raise ConfigError(one_line(error)) from error
 
 
@@ -169,12 +169,29 @@ def prepare(overrides: Sequence[str]) -> list[str]:
     Raises:
         ConfigError: If a plug-in cannot be loaded, or a group has another value than a name.
     """
+    _check_readable(overrides)
     load_config_plugins(plugins_in(overrides))
     check_group_values(overrides)
     prepared = normalised(overrides)
     for group in _MAY_BE_NULL:
         _check_parts(group, prepared)
     return prepared
+
+
+_LONGEST_NUMBER = 4300  # digits; Python reads no longer ones
+
+
+def _check_readable(overrides: Sequence[str]) -> None:
+    """Refuse what makes Python fail before Hydra's grammar could refuse it."""
+    for text in overrides:
+        if "\0" in text:
+            raise ConfigError(f"{text!r}: a null character")
+        if not text.strip().lstrip("+~").partition("=")[0].strip():
+            raise ConfigError(f"{text!r} has no key: KEY=VALUE is expected")
+        if re.search(rf"\d{{{_LONGEST_NUMBER + 1}}}", text):
+            raise ConfigError(
+                f"{text.partition('=')[0]}: a number of more than {_LONGEST_NUMBER} digits"
+            )
 
 
 def _check_parts(group: str, overrides: Sequence[str]) -> None:

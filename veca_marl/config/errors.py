@@ -17,7 +17,14 @@ _NO_LIST = re.compile("is not a ListConfig, list or tuple")
 
 
 class ConfigError(ValueError):
-    """An impossible configuration; the message is one line."""
+    """An impossible configuration; the message is one line, whatever it quotes.
+
+    Args:
+        message: What is wrong, and the choices.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.splitlines()))
 
 
 def one_line(error: BaseException) -> str:

@@ -34,7 +34,7 @@ def parse(overrides: Sequence[str]) -> list[Override]:
 def _parse(parser: OverridesParser, text: str) -> Override:
     try:
         return parser.parse_override(text)
-    except HydraException as error:
+    except (HydraException, ValueError) as error:  # also of a number that Python does not read
         key, equals, value = text.partition("=")
         advice = f"; quoted it is a text: {key}={quoted(value)}" if equals and value else ""
         reason = one_line(error).partition(" See https://hydra.cc")[0]

@@ -178,6 +178,7 @@ def test_look_at_has_a_level_horizon():
     ("numbers", "named"),
     [
         ({"width": 0}, "0x84"),
+        ({"width": 10**9}, "1000000000x84"),
         ({"width": 84.5}, "84.5x84"),
         ({"fov_deg": 180.0}, "180.0"),
         ({"fov_deg": np.nan}, "fov_deg nan"),

@@ -256,6 +256,7 @@ def test_freshly_compiled_kernels_compute_the_same_bytes(tmp_path):
     ("numbers", "parts"),
     [
         ({"width": 0}, ("0x84",)),
+        ({"width": 10**9}, ("1000000000x84",)),
         ({"height": 84.5}, ("84x84.5",)),
         ({"fov_deg": 200.0}, ("fov_deg", "200.0")),
         ({"eyes": "three"}, ("eyes", "'three'", "binocular", "monocular")),

@@ -222,7 +222,10 @@ class SupervisedRayCollector(RayCollector):
 def _connect(cores: int) -> None:
     """Connect to a cluster with that many cores, or start one on this machine."""
     if not ray.is_initialized():
-        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # a run reports to nobody
+        # of a cluster that is started here: a run reports to nobody, and its actors have the
+        # priority of worker processes (Ray's default of 15 starves them on a busy machine)
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        os.environ.setdefault("RAY_worker_niceness", "0")
         try:
             _init(cores)
         except (ConnectionError, RuntimeError, RayError) as error:

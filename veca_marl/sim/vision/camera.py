@@ -36,6 +36,9 @@ class MeshView(NamedTuple):
     lights: Depths
 
 
+_MOST_PIXELS = 8192  # of a row or column; more is a slip, and fills the memory
+
+
 @dataclass(frozen=True)
 class Camera:
     """A pinhole camera looking along the x axis of its pose, with the z axis up.
@@ -60,9 +63,10 @@ class Camera:
 
     def __post_init__(self) -> None:
         whole = isinstance(self.width, Integral) and isinstance(self.height, Integral)
-        if not whole or self.width < 1 or self.height < 1:
+        if not whole or not (1 <= self.width <= _MOST_PIXELS and 1 <= self.height <= _MOST_PIXELS):
             raise ValueError(
-                f"width x height {self.width}x{self.height} must be whole numbers, at least 1x1"
+                f"width x height {self.width}x{self.height} must be whole numbers, "
+                f"at least 1x1 and at most {_MOST_PIXELS}x{_MOST_PIXELS}"
             )
         if not 0.0 < self.fov_deg < 170.0:
             raise ValueError(f"fov_deg {self.fov_deg} must be between 0 and 170")
