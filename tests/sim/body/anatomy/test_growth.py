@@ -69,12 +69,23 @@ def test_without_a_size_the_body_is_that_of_the_table():
     assert REFERENCE.sitting == 1.0
 
 
+def height_m(skeleton):
+    """From the skin of the soles to the end of the head bone of a standing body."""
+    positions, rotations = standing(skeleton)
+    head = skeleton.bone("head")
+    soles = Underside(skeleton, ["l_foot", "r_foot"], skin=True)
+    top = positions[head, 2] + skeleton.bones[head].tip[2]
+    return top - soles.lowest_m(positions, rotations)
+
+
 def test_the_height_is_the_median_of_the_age(age, growth):
-    skeleton = load_skeleton(growth)
-    sole_m = Underside(skeleton, ["l_foot", "r_foot"], skin=True).lowest_m(*standing(skeleton))
-    height_m = vertices_of(growth)[:, 2].max() - sole_m
-    assert height_m == pytest.approx(WHO_HEIGHT_CM[age - 1] / 100.0, abs=1e-6)
-    assert np.ptp(vertices_of(growth)[:, 2]) == pytest.approx(height_m, abs=0.01)
+    assert height_m(load_skeleton(growth)) == pytest.approx(WHO_HEIGHT_CM[age - 1] / 100.0)
+    # the skin of the top of the head is near the end of the bone
+    assert np.ptp(vertices_of(growth)[:, 2]) == pytest.approx(growth.height_m, abs=0.01)
+
+
+def test_the_lengths_of_the_table_of_bones_are_those_of_its_growth():
+    assert height_m(load_skeleton()) == pytest.approx(REFERENCE_HEIGHT_M)
 
 
 def test_the_mass_is_the_median_of_the_age(age, growth):
