@@ -170,6 +170,12 @@ Each row is tried by tests on every change (those that take long, each night).
 
 What runs do then: [interruptions](guides/interruptions.md).
 
+## What soaks have found
+
+Mended since: words of a command line with a null character, without a key, with a line break or
+with a number of 5000 digits ended in a traceback or in two lines; `senses.vision.width=1e9` was
+accepted and filled the memory of the machine (13.8 GB) until the system killed the process.
+
 ## What is not covered
 
 - A soak on one machine says nothing of networks between machines; servers and Ray's actors are
