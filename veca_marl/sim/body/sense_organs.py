@@ -12,6 +12,7 @@ its sight, see `Body.sight`.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Mapping
 from typing import Protocol
@@ -46,10 +47,19 @@ def resting_mount(name: str, head: Pose, head_size: float = 1.0) -> Pose:
         KeyError: If there is no such organ; the message lists those that exist.
     """
     try:
-        offset = MOUNTS_M[name]
+        offset = _offsets(head_size)[name]
     except KeyError:
         raise KeyError(f"no mount {name!r}; there are {list(MOUNTS_M)}") from None
-    return Pose(head.position + head.rotation @ (np.array(offset) * head_size), head.rotation)
+    return Pose(head.position + head.rotation @ offset, head.rotation)
+
+
+@functools.cache  # read several times in each step
+def _offsets(head_size: float) -> dict[str, Floats]:
+    """Return where the organs of a head are in its frame, each ``(3,)`` metres, read-only."""
+    offsets = {name: np.array(offset) * head_size for name, offset in MOUNTS_M.items()}
+    for offset in offsets.values():
+        offset.setflags(write=False)
+    return offsets
 
 
 class Gaze:
