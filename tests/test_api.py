@@ -13,8 +13,9 @@ import veca_marl
 from veca_marl import api
 from veca_marl.algos.evaluation.evaluate import random_policy
 from veca_marl.algos.networks.encoders import Precision
-from veca_marl.api import GameChoices, as_integer, choose
+from veca_marl.api import as_integer
 from veca_marl.config import ConfigError
+from veca_marl.config.choices import GameChoices, choose
 from veca_marl.envs.core.game_cfg import Script
 from veca_marl.override_text import quoted
 from veca_marl.runs.episode_page import read_page

@@ -198,6 +198,7 @@ def test_a_preset_that_changed_is_read_again(outside):
     write_package(outside, "dim_plugin", "")
     preset = outside / "dim_plugin" / "conf" / "senses" / "vision" / "dim.yaml"
     preset.parent.mkdir(parents=True)
+    (preset.parent / ".#dim.yaml").symlink_to("nobody@nowhere")  # the lock of an editor
     words = ["plugins=[dim_plugin]", "+task=KickTheBall", "senses/vision=dim"]
     found = []
     for blur_deg in (1.0, 12.5):

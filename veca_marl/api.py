@@ -9,30 +9,33 @@ from __future__ import annotations
 import math
 import operator
 import sys
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing, nullcontext
-from dataclasses import fields
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import Any, ParamSpec, TypedDict, TypeVar, Unpack
+from typing import Any, ParamSpec, TypeVar, Unpack
 
 import torch
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from veca_marl.algos.evaluation.evaluate import ActionPolicy
 from veca_marl.checks import CheckCfg, TaskReport, check_game
-from veca_marl.config import Config, ConfigError, compose, compose_node, to_config
+from veca_marl.config import ConfigError, compose_node, to_config
+from veca_marl.config.choices import (
+    GameChoices,
+    check_list,
+    check_overrides,
+    choose,
+    chosen_overrides,
+)
 from veca_marl.config.command_line import check_file, check_folder
-from veca_marl.config.overrides import parse, root_of
 from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.spaces import SpaceLayout
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
-from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.envs.core.task import TASKS, Task
 from veca_marl.gymnasium_ids import register_task
-from veca_marl.override_text import normalised
 from veca_marl.plugins import Plugin, load_plugins
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, find_device, make_trainer
@@ -43,115 +46,6 @@ from veca_marl.runs.run_folder import new_run
 from veca_marl.runs.served_worlds import import_remote
 from veca_marl.runs.training import TrainingResult, run_training
 from veca_marl.runs.video import SAMPLE_RATE_HZ
-
-# `opponent` is the configuration of `GameCfg.script`
-_GAME_ROOTS = {f.name for f in fields(GameCfg)} - {"script"} | {
-    "development",
-    "opponent",
-    "plugins",
-}
-
-
-class GameChoices(TypedDict, total=False):
-    """Arguments that all functions for one task share; `make` describes them."""
-
-    playground: str | None
-    body: str | None
-    senses: Mapping[str, str] | None
-    overrides: Sequence[str]
-    plugins: Sequence[str]
-
-
-def choose(task: str, **choices: Unpack[GameChoices]) -> GameCfg:
-    """Return the configuration of the game that `make` makes.
-
-    Raises:
-        ConfigError: If there is no such choice, or an override is not of the game; the message
-            lists the choices there are.
-    """
-    texts = chosen_overrides(task, **choices)
-    _check_overrides(choices.get("overrides", ()), {"task": "task", "seed": "seed"}, _GAME_ROOTS)
-    return compose_game(texts).game
-
-
-def compose_game(overrides: Sequence[str]) -> Config:
-    """Return the configuration in which a game is composed from the words of a command line.
-
-    Raises:
-        ConfigError: If one is not of the game, or there is no such choice.
-    """
-    _check_overrides(overrides, {}, _GAME_ROOTS)
-    cfg = compose(overrides)
-    for team, path in cfg.frozen.items():
-        raise ConfigError(
-            f"opponent.{team}={path}: an environment does not play the policy of a run; choices: "
-            f"{', '.join(script.value for script in Script)}; `train` and "
-            "python -m veca_marl.evaluate play it"
-        )
-    return cfg
-
-
-def chosen_overrides(
-    task: str,
-    *,
-    playground: str | None = None,
-    body: str | None = None,
-    senses: Mapping[str, str] | None = None,
-    overrides: Sequence[str] = (),
-    plugins: Sequence[str] = (),
-) -> list[str]:
-    """Return choices as the overrides of a command line.
-
-    Raises:
-        ConfigError: If one is not of the type that `GameChoices` states.
-    """
-    _check_list("plugins", plugins, '["my_tasks"]')
-    _check_list("overrides", overrides, '["task.life_s=4.0"]')
-    if not isinstance(senses or {}, Mapping):
-        raise ConfigError(f'senses={senses!r} must be a mapping, such as {{"audio": "mono"}}')
-    named = {"playground": playground, "body": body}
-    named |= {f"senses/{sense}": preset for sense, preset in (senses or {}).items()}
-    chosen = {"+task": task} | {key: value for key, value in named.items() if value is not None}
-    for key, value in chosen.items():
-        if not isinstance(value, str):
-            raise ConfigError(f"{key.lstrip('+')}={value!r} must be a name, as text")
-    packages = [f"plugins=[{','.join(plugins)}]"] if plugins else []
-    return [*(f"{key}={value}" for key, value in chosen.items()), *packages, *overrides]
-
-
-def _check_list(argument: str, value: Any, example: str) -> None:
-    """Check an argument that is a list of texts; one text alone would be read letter by letter.
-
-    Raises:
-        ConfigError: If it is another thing.
-    """
-    is_list = isinstance(value, Sequence) and not isinstance(value, str)
-    if not is_list or not all(isinstance(entry, str) for entry in value):
-        raise ConfigError(f"{argument}={value!r} must be a list of texts, such as {example}")
-
-
-def _check_overrides(
-    overrides: Sequence[str], arguments: Mapping[str, str], roots: Container[str] | None = None
-) -> None:
-    """Check that overrides leave out what arguments choose.
-
-    Args:
-        overrides: The overrides.
-        arguments: Key of the configuration, or `hydra`, to the argument that chooses it.
-        roots: Roots of keys that can be changed; None is all others.
-
-    Raises:
-        ConfigError: If one does not, or is of another root.
-    """
-    for text, override in zip(overrides, parse(normalised(overrides)), strict=True):
-        key, root = override.key_or_group, root_of(override)
-        if argument := arguments.get(root if root == "hydra" else key):
-            raise ConfigError(f"overrides: {text!r} is chosen by the argument `{argument}`")
-        if roots is not None and root not in roots:
-            raise ConfigError(
-                f"overrides: {text!r} is not of the game; choices: {', '.join(sorted(_GAME_ROOTS))}"
-            )
-
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
@@ -201,7 +95,7 @@ def list_tasks(plugins: Sequence[str] = (), suite: str = "veca") -> list[str]:
         ConfigError: If `plugins` is no list of names.
         ValueError: If there is no such suite; the message lists those there are.
     """
-    _check_list("plugins", plugins, '["my_tasks"] (a suite is suite="babybench")')
+    check_list("plugins", plugins, '["my_tasks"] (a suite is suite="babybench")')
     load_plugins(plugins)
     suites = {task.suite for task in TASKS.values()}
     if not isinstance(suite, str) or suite not in suites:
@@ -401,7 +295,7 @@ def train(
         if total_frames is not None:
             chosen.append(f"total_frames={as_integer('total_frames', total_frames)}")
             arguments["total_frames"] = "total_frames"
-        _check_overrides(choices.get("overrides", ()), arguments)
+        check_overrides(choices.get("overrides", ()), arguments)
         node = compose_node(chosen)
         if node.resume is not None:
             raise ConfigError(

@@ -9,6 +9,7 @@ with `veca_marl`, and `plugins=[my_package]` on the command line or in `veca_mar
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -74,8 +75,8 @@ def load_plugins(names: Sequence[str] = ()) -> None:
 
 def _state_of_path() -> tuple[tuple[str, int], ...]:
     """Return the folders in which packages are searched, and when their contents changed."""
-    folders = (Path(entry or ".") for entry in sys.path)
-    return tuple((str(each), each.stat().st_mtime_ns) for each in folders if each.is_dir())
+    folders = [os.path.abspath(entry) for entry in sys.path if os.path.isdir(entry or ".")]
+    return tuple((folder, os.stat(folder).st_mtime_ns) for folder in folders)
 
 
 @lru_cache(maxsize=1)

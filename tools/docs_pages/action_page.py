@@ -5,8 +5,8 @@ from __future__ import annotations
 from tools.docs_pages.observation_page import describe
 from tools.docs_pages.tables import table
 from veca_marl.algos.ppo import PPOCfg
-from veca_marl.api import choose
 from veca_marl.config import conf_dir
+from veca_marl.config.choices import choose
 from veca_marl.envs.core.game import Game
 from veca_marl.sim.sense import ArraySpec
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tools.docs_pages.tables import table
 from tools.docs_pages.task_pages import built_in_tasks
-from veca_marl.api import choose
+from veca_marl.config.choices import choose
 from veca_marl.envs.core.game import Game
 from veca_marl.sim.sense import ArraySpec
 

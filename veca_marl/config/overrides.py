@@ -85,13 +85,18 @@ def conf_dirs() -> list[Path]:
 
 def state_of_sources() -> Hashable:
     """Return what differs once a configuration file or a stored schema has changed."""
-    files = []
-    for folder in conf_dirs():
-        for where, _, names in os.walk(folder):
-            for name in names:
-                status = os.stat(os.path.join(where, name))
-                files.append((where, name, status.st_mtime_ns, status.st_size))
-    return tuple(files), tuple(_stored_nodes(ConfigStore.instance().repo))
+    files = tuple(state for folder in conf_dirs() for state in _states_of_files(folder))
+    return files, tuple(_stored_nodes(ConfigStore.instance().repo))
+
+
+def _states_of_files(folder: Path) -> Iterator[tuple[str, int, int]]:
+    """Yield path, time of the last change in ns, and bytes of each configuration file."""
+    for where, _, names in os.walk(folder):
+        for name in names:
+            path = os.path.join(where, name)
+            if name.endswith(".yaml") and os.path.isfile(path):  # editors leave broken links
+                status = os.stat(path)
+                yield path, status.st_mtime_ns, status.st_size
 
 
 class _Identity:

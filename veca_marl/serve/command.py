@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from veca_marl.api import compose_game
 from veca_marl.config import Config, ConfigError, one_line
+from veca_marl.config.choices import compose_game
 from veca_marl.config.command_line import CommandLine
 from veca_marl.envs.core.game import Game
 from veca_marl.runs.served_worlds import game_text, import_remote

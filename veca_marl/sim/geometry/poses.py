@@ -75,6 +75,40 @@ def quaternions_to_matrices(quaternions: Floats, out: Floats) -> None:
         out[n, 2, 2] = 1.0 - (x * xs + y * ys)
 
 
+@njit(cache=True)
+def follow_poses(
+    positions: Floats,
+    rotations: Floats,
+    rows: NDArray[np.int64],
+    last_positions: Floats,
+    last_rotations: Floats,
+) -> Floats:
+    """Copy the poses of some frames, and compare them with the last copy.
+
+    Args:
+        positions: ``(F, 3)`` metres, of all frames.
+        rotations: ``(F, 3, 3)``, likewise.
+        rows: ``(n,)`` which of the frames.
+        last_positions: ``(n, 3)`` metres, the last copy; infinite where there is none; updated.
+        last_rotations: ``(n, 3, 3)``, likewise.
+
+    Returns:
+        ``(n,)``: for each frame the greatest change of a coordinate, in metres, or of an element of
+        the rotation; 0 if nothing has changed.
+    """
+    changes = np.zeros(len(rows))
+    for n in range(len(rows)):
+        row = rows[n]
+        for i in range(3):
+            changes[n] = max(changes[n], abs(positions[row, i] - last_positions[n, i]))
+            last_positions[n, i] = positions[row, i]
+            for j in range(3):
+                change = abs(rotations[row, i, j] - last_rotations[n, i, j])
+                changes[n] = max(changes[n], change)
+                last_rotations[n, i, j] = rotations[row, i, j]
+    return changes
+
+
 def rotation_with_z(axis: Floats) -> Floats:
     """Return a rotation ``(3, 3)`` whose z axis is `axis`, a unit vector."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]

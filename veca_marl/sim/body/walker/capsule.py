@@ -47,9 +47,11 @@ from veca_marl.sim.geometry import (
 from veca_marl.sim.physics import Prop, World, create_collision_shape
 from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
 
+DISPLACED_M = 0.06
+"""A moving obstacle may displace the capsule by so much within an agent step."""
+
 _ROUNDS = 3  # two for the walls of a corner, one spare
 _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched toes
-_MARGIN_M = 0.06  # an obstacle may displace the capsule by so much within one agent step
 _GAP_M = 0.01  # more than the margins of Bullet's shapes
 _CARPET_M = 0.02  # what is lower is walked over
 _DEPTH_M = 1e-6  # less is rounding
@@ -139,7 +141,7 @@ class Capsule:
             self._find_obstacles(props, bodies)
         self._capsules = capsules
         self._squeezed = False
-        reach_m = self._reach_m + _MARGIN_M + distance_m + approach_m
+        reach_m = self._reach_m + DISPLACED_M + distance_m + approach_m
         near = self._obstacles.near(position, reach_m)
         self._near = [body_id for body_id in near if body_id != self.support_id]
         self.leave_out(self.walked_over)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from veca_marl.sim.body.base import Body
-from veca_marl.sim.body.walker.capsule import Capsule
+from veca_marl.sim.body.walker.capsule import DISPLACED_M, Capsule
 from veca_marl.sim.body.walker.feet import Footing, is_walked_over, middle, surface_height_m
 from veca_marl.sim.body.walker.stances import Stance
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
@@ -24,7 +24,6 @@ from veca_marl.sim.sound.modal_synthesis import (
     bar_modes,
 )
 
-_DISPLACED_M = 0.06  # by moving things within an agent step
 _APPROACH_MPS = 3.0  # obstacles that approach faster may be overlooked within an agent step
 
 
@@ -118,7 +117,7 @@ class GroundMotion:
         """What its capsule can touch in this agent step: centre and radius, metres."""
         x, y = self.ground.tolist()
         way_m = abs(self.speed_mps) * self._world.clock.step_s
-        return x, y, self.capsule.reach_m + _DISPLACED_M + way_m
+        return x, y, self.capsule.reach_m + DISPLACED_M + way_m
 
     def walk_freely(self) -> None:
         """Walk for an agent step in which nothing can be met; it ends with `after_step`.

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.geometry import Floats, Scene, horizontal_distance
+from veca_marl.sim.geometry import Floats, Scene, follow_poses, horizontal_distance
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.props.geoms import swept_radius_m
@@ -51,7 +51,7 @@ class ObstacleBoxes:
         self._fixed_numbers, self._numbers = frozenset(fixed), list[int]()
         rows = [scene.objects[props[number].object_id].rows for number in fixed]
         self._frames = np.array([row.start for row in rows], int)
-        self._places, self._turns = np.full((len(fixed), 3), np.nan), np.zeros((len(fixed), 3, 3))
+        self._places, self._turns = np.full((len(fixed), 3), np.inf), np.zeros((len(fixed), 3, 3))
 
     def near(self, position: Floats, reach_m: float) -> list[int]:
         """Return PyBullet's ids of the obstacles within a distance along x and y.
@@ -63,7 +63,7 @@ class ObstacleBoxes:
         self._read(self._moving)
         scene = self._scene
         poses = scene.positions, scene.rotations, self._frames
-        if follow_frames(*poses, self._places, self._turns):
+        if follow_poses(*poses, self._places, self._turns).any():
             self._read(self._fixed)
         numbers = near_boxes(self._low, self._high, self._beyond_m, position, reach_m)
         self._numbers = numbers.tolist()
@@ -97,34 +97,6 @@ class ObstacleBoxes:
         """Return the corners of Bullet's box about one link of an obstacle."""
         low, high = self._client.getAABB(self.ids[number], link)
         return low, high
-
-
-@njit(cache=True)
-def follow_frames(
-    positions: Floats,
-    rotations: Floats,
-    frames: NDArray[np.int64],
-    places: Floats,
-    turns: Floats,
-) -> bool:
-    """Copy the poses of some frames; return whether one of them has changed.
-
-    Args:
-        positions: ``(F, 3)`` metres, of all frames.
-        rotations: ``(F, 3, 3)``, likewise.
-        frames: ``(n,)`` which of them.
-        places: ``(n, 3)`` metres, their last positions; updated.
-        turns: ``(n, 3, 3)``, their last rotations; updated.
-    """
-    changed = False
-    for n in range(len(frames)):
-        for i in range(3):
-            if places[n, i] != positions[frames[n], i]:
-                places[n, i], changed = positions[frames[n], i], True
-            for j in range(3):
-                if turns[n, i, j] != rotations[frames[n], i, j]:
-                    turns[n, i, j], changed = rotations[frames[n], i, j], True
-    return changed
 
 
 @njit(cache=True)

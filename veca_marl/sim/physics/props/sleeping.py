@@ -7,10 +7,8 @@ from collections.abc import Collection
 from typing import Protocol
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
-from veca_marl.sim.geometry import Floats, Scene
+from veca_marl.sim.geometry import Floats, Scene, follow_poses
 from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.clock import ClockCfg
 from veca_marl.sim.physics.props.prop import REST_SPEED, Awake, Prop, Rest, Sleep
@@ -182,7 +180,7 @@ class RestingProps:
             scene: Where they are at the end of an agent step.
         """
         frames = scene.positions, scene.rotations, self._rows
-        moved = _follow(*frames, self._positions, self._rotations)
+        moved = follow_poses(*frames, self._positions, self._rotations)
         self._motionless = not moved.any()
         for sleep, change in zip(self._sleeps, moved.tolist(), strict=True):
             sleep.count(change < self._rest_m)
@@ -203,36 +201,6 @@ class RestingProps:
         """See `PropSleep`."""
         for sleep in self._sleeps:
             sleep.fall_asleep()
-
-
-@njit(cache=True)
-def _follow(
-    positions: Floats,
-    rotations: Floats,
-    rows: NDArray[np.int64],
-    last_positions: Floats,
-    last_rotations: Floats,
-) -> Floats:
-    """Copy poses; return the greatest change of a number in each, ``(n,)`` metres or 1.
-
-    Args:
-        positions: ``(F, 3)`` metres, of all frames.
-        rotations: ``(F, 3, 3)``, likewise.
-        rows: ``(n,)`` the frames of the poses.
-        last_positions: ``(n, 3)`` metres, the last copy; updated.
-        last_rotations: ``(n, 3, 3)``, likewise.
-    """
-    changes = np.zeros(len(rows))
-    for n in range(len(rows)):
-        row = rows[n]
-        for i in range(3):
-            changes[n] = max(changes[n], abs(positions[row, i] - last_positions[n, i]))
-            last_positions[n, i] = positions[row, i]
-            for j in range(3):
-                change = abs(rotations[row, i, j] - last_rotations[n, i, j])
-                changes[n] = max(changes[n], change)
-                last_rotations[n, i, j] = rotations[row, i, j]
-    return changes
 
 
 def prop_sleep(client: BulletClient, clock: ClockCfg) -> PropSleep:
