@@ -6,6 +6,7 @@ import pickle
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from refusals import naming
 from veca_marl import api
 from veca_marl.config import ConfigError, compose
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.task import TASKS
+from veca_marl.envs.core.task import TASKS, Task, TaskCfg, register_task
 from veca_marl.plugins import PLUGINS, load_plugins
 from veca_marl.runs.assembly import GameFactory
 from veca_marl.runs.run_folder import open_run
@@ -205,6 +206,28 @@ def test_a_preset_that_changed_is_read_again(outside):
         preset.write_text(f"blur_deg: {blur_deg}\n")
         found.append(compose(words).senses.vision.blur_deg)
     assert found == [1.0, 12.5]
+
+
+def test_a_task_that_is_defined_in_a_function_is_composed_twice(outside):
+    @dataclass
+    class LocalTaskCfg(TaskCfg):
+        name: str = "LocalTask"
+        reach_m: float = 1.0
+
+    @register_task
+    class LocalTask(Task):
+        cfg: LocalTaskCfg
+        senses = ("proprioception",)
+
+        def build(self): ...
+
+        def reset(self, rng): ...
+
+        def reward(self, player):
+            return {}
+
+    for reach_m in (2.0, 2.0, 3.0):
+        assert compose(["+task=LocalTask", f"task.reach_m={reach_m}"]).task.reach_m == reach_m
 
 
 def test_a_plugin_that_is_installed_later_is_found(outside):

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from heard_scenes import Dummy, Scene, buzz_at, tone_at
@@ -5,7 +7,7 @@ from listening import EAR, RATE, STEP, noise, yaw
 from refusals import naming
 from stand_in_worlds import SoundWorld
 
-from veca_marl.sim.hearing import AudioCfg, AudioQuality, AudioSense, Window
+from veca_marl.sim.hearing import AudioCfg, AudioQuality, AudioSense, Encoding, Window
 from veca_marl.sim.hearing.hrtf import kemar_response
 from veca_marl.sim.sense import check_spec
 from veca_marl.sim.sound import Clip, Noise, SoundField
@@ -115,11 +117,22 @@ def test_the_ear_on_the_side_of_the_source_is_louder():
         assert left > right + 0.03
 
 
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 1e9, 200.1, -200.1])
+def test_a_noise_floor_that_is_no_level_is_refused(wrong):
+    with pytest.raises(ValueError, match=naming("noise_floor_db", str(wrong), "-200", "200")):
+        AudioCfg(noise_floor_db=wrong)
+
+
+@pytest.mark.parametrize("floor_db", [-200.0, 200.0])
+@pytest.mark.parametrize("encoding", Encoding)
+def test_observations_are_finite_at_the_greatest_and_least_noise_floor(floor_db, encoding):
+    scene = Scene(Noise(0.1, RATE), noise_floor_db=floor_db, encoding=encoding)
+    assert np.isfinite(scene.hear()["audio"]).all()
+
+
 def test_invalid_settings_are_refused():
     with pytest.raises(ValueError, match=naming("sofa_sample_rate_hz", "44100.0", "sofa_path")):
         AudioCfg(sofa_sample_rate_hz=44_100.0)
-    with pytest.raises(ValueError, match="noise_floor_db"):
-        AudioCfg(noise_floor_db=float("nan"))
     with pytest.raises(ValueError, match=naming("senses.audio.window='hann'", "rectangular")):
         AudioCfg(window="hann")
     with pytest.raises(ValueError, match=naming("senses.audio.quality='mono'", "hrtf", "stereo")):

@@ -260,6 +260,9 @@ class AudioQuality(Enum):
     mono = "mono"
 
 
+_MOST_DB = 200.0  # the squared magnitudes are numbers of single precision
+
+
 @dataclass
 class AudioCfg:
     """Settings of the sense of hearing.
@@ -280,8 +283,9 @@ class AudioCfg:
             (diameter 0.175 m); 0.733 gives the 0.128 m between the ears of the body of 0.78 m. On a
             body of another size it is in proportion to the head.
         window: See `Window`.
-        noise_floor_db: Level of the receiver's own noise relative to an rms pressure of 1 (-80,
-            for example), or None. Its expected power is added, so that nothing becomes random.
+        noise_floor_db: Level of the receiver's own noise relative to an rms pressure of 1, from
+            -200 to 200, such as -80, or None. Its expected power is added, so that nothing becomes
+            random.
     """
 
     present: bool = True
@@ -308,8 +312,11 @@ class AudioCfg:
             )
         if self.sofa_path is not None:
             check_can_read_sofa(self.sofa_path)
-        if self.noise_floor_db is not None and not np.isfinite(self.noise_floor_db):
-            raise ValueError(f"noise_floor_db must be finite or None, got {self.noise_floor_db}")
+        if self.noise_floor_db is not None and not abs(self.noise_floor_db) <= _MOST_DB:
+            raise ValueError(
+                f"senses.audio.noise_floor_db={self.noise_floor_db} must be from {-_MOST_DB:g} to "
+                f"{_MOST_DB:g}, or null for no noise"
+            )
 
 
 def _check_choice(name: str, value: object, kinds: type[Enum]) -> None:
