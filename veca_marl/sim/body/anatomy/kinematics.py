@@ -173,6 +173,11 @@ class Underside:
         skeleton: The skeleton.
         bones: Names of the bones.
         skin: Whether their flexible skin counts, or the rigid bones alone.
+
+    Attributes:
+        frames: ``(n,)`` bones of the balls that have the hulls of all bones.
+        offsets: ``(n, 3)`` metres, their centres in the frames of the bones.
+        radii: ``(n,)`` metres.
     """
 
     def __init__(self, skeleton: Skeleton, bones: Sequence[str], skin: bool) -> None:
@@ -182,9 +187,9 @@ class Underside:
             skin_m = skeleton.bones[frame].skin_thickness_m if skin else 0.0
             for part in skeleton.bones[frame].colliders:
                 points += [(frame, at, radius + skin_m) for at, radius in _extremes(part)]
-        self._frames = np.array([frame for frame, _, _ in points])
-        self._offsets = np.array([offset for _, offset, _ in points])
-        self._radii = np.array([radius for _, _, radius in points])
+        self.frames = np.array([frame for frame, _, _ in points])
+        self.offsets = np.array([offset for _, offset, _ in points])
+        self.radii = np.array([radius for _, _, radius in points])
 
     def lowest_m(self, positions: Floats, rotations: Floats) -> float:
         """Return the height of the lowest point.
@@ -193,7 +198,7 @@ class Underside:
             positions: ``(47, 3)`` bone origins, metres.
             rotations: ``(47, 3, 3)`` bone rotations.
         """
-        return float(_lowest_m(self._frames, self._offsets, self._radii, positions, rotations))
+        return float(_lowest_m(self.frames, self.offsets, self.radii, positions, rotations))
 
     def put_on(self, surface_m: float, positions: Floats, rotations: Floats) -> None:
         """Shift all bones vertically, so that the lowest point is at the height of a surface.
@@ -203,7 +208,7 @@ class Underside:
             positions: ``(47, 3)`` bone origins, metres; the heights are changed.
             rotations: ``(47, 3, 3)`` bone rotations.
         """
-        _put_on(surface_m, self._frames, self._offsets, self._radii, positions, rotations)
+        _put_on(surface_m, self.frames, self.offsets, self.radii, positions, rotations)
 
 
 @njit(cache=True)

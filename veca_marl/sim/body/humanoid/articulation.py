@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
 from veca_marl.sim.body.humanoid.body_dynamics import NEW_POSE, BodyDynamics
+from veca_marl.sim.body.humanoid.bone_ends import bone_ends
 from veca_marl.sim.body.humanoid.link_tree import JointLimits, read_tree
 from veca_marl.sim.geometry import Floats, Pose, cross, matrix_to_quaternion
 from veca_marl.sim.physics.bullet_client import BulletClient, JointInfo, pybullet
@@ -152,7 +153,8 @@ class Articulation:
         self._release(low, high)
         limits = JointLimits(low, high, _TOP_SPEED_RADPS, limit_margin_rad)
         tree = read_tree(client, self.body_id)
-        self.dynamics = BodyDynamics(tree, limits, self.damping[self.moving])
+        ends = bone_ends(client, self.body_id, skeleton, tree, self._base_centre)
+        self.dynamics = BodyDynamics(tree, limits, ends, self.damping[self.moving])
         self._mass_kg = float(self.dynamics.tree.masses.sum())
         self._weight = np.zeros(3)  # N
         self.read_gravity()

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from veca_marl.sim.body.humanoid.bone_ends import BoneEnds, excess_m
 from veca_marl.sim.body.humanoid.implicit_torques import (
     add_product,
     dense,
@@ -80,6 +81,7 @@ def begin(
 def settle(
     tree: LinkTree,
     limits: JointLimits,
+    ends: BoneEnds,
     step_s: float,
     weight: Floats,
     contact: int,
@@ -90,9 +92,12 @@ def settle(
 ) -> int:
     """Apply joint limits to the state after a step and give the base the momentum that it has.
 
+    If a bone is deeper in the floor than `DEEPEST_M` then, the body is raised.
+
     Args:
         tree: The tree of n hinges.
         limits: Limits of angles and speeds.
+        ends: The ends of the bones.
         step_s: Duration of the physics step.
         weight: ``(3,)`` N, weight of the body.
         contact: `TOUCHED` or `FREE` if it is known whether another body is touched, or `UNKNOWN`.
@@ -127,6 +132,8 @@ def settle(
     write_mass_matrix(tree, links, state.centre, state.mass_matrix)
     for i in range(3):
         state.position[i] = goal[i] - state.centre[i]
+    state.position[2] += excess_m(ends, links, state.position[2])
+    for i in range(3):
         if abs(state.position[i] - solver.position[i]) > _SAME_PLACE_M:
             result = NEW_POSE
     _write_velocity(tree, state, solver.velocity)
@@ -221,6 +228,7 @@ class BodyDynamics:
     Args:
         tree: Masses and frames of its links.
         limits: Limits of its joints.
+        ends: The ends of its bones.
         damping: ``(n,)`` N m s/rad, of its joints.
 
     Attributes:
@@ -230,9 +238,11 @@ class BodyDynamics:
         solver: What Bullet has after a physics step: to be written before `begin` and `settle`.
     """
 
-    def __init__(self, tree: LinkTree, limits: JointLimits, damping: Floats) -> None:
+    def __init__(
+        self, tree: LinkTree, limits: JointLimits, ends: BoneEnds, damping: Floats
+    ) -> None:
         self.tree = tree
-        self._limits = limits
+        self._limits, self._ends = limits, ends
         depth = tree.paths.shape[1]
         self.state: BodyState = empty_state(tree.hinges, depth)
         self.solver: SolverState = empty_solver_state(tree.hinges)
@@ -269,7 +279,8 @@ class BodyDynamics:
 
     def _settle(self, step_s: float, weight: Floats, contact: int) -> int:
         arrays = (self.solver, self.state, self._links, self.forces)
-        result: int = settle(self.tree, self._limits, step_s, weight, contact, *arrays)
+        body = (self.tree, self._limits, self._ends)
+        result: int = settle(*body, step_s, weight, contact, *arrays)
         return result
 
     # ---- what follows from the state

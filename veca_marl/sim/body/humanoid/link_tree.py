@@ -222,10 +222,9 @@ def read_tree(client: BulletClient, body_id: int) -> LinkTree:
         client: The PyBullet client.
         body_id: A body with all joints at 0; its base's inertia is diagonal in the base's frame.
     """
-    links = _links(client, body_id)
-    groups = _rigid_groups(links)
+    groups = _rigid_groups(_links(client, body_id))
     heads = [group[0] for group in groups]
-    row_of = {link.number: i for i, group in enumerate(groups) for link in group}
+    row_of = _rows(groups)
     parents = [-1] + [row_of[head.parent] for head in heads[1:]]
     frames = [head.frame for head in heads]
     merged = [_merged(group) for group in groups]
@@ -245,6 +244,15 @@ def read_tree(client: BulletClient, body_id: int) -> LinkTree:
         centres=np.array([whole.centre for whole in merged]),
         inertias=np.array([whole.matrix for whole in merged]),
     )
+
+
+def link_rows(client: BulletClient, body_id: int) -> dict[int, int]:
+    """Return the link of the tree that each of Bullet's links belongs to; -1 is the base."""
+    return _rows(_rigid_groups(_links(client, body_id)))
+
+
+def _rows(groups: list[list[_Link]]) -> dict[int, int]:
+    return {link.number: i for i, group in enumerate(groups) for link in group}
 
 
 def _paths(parents: list[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
