@@ -5,10 +5,13 @@ import os
 
 import pytest
 import torch
+from refusals import naming
 
 from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.processes import cores as process_cores
+from veca_marl.processes.cores import CORES, usable_cores
 from veca_marl.runs import cores, training
-from veca_marl.runs.cores import contention_warning, idle_cores_hint, usable_cores
+from veca_marl.runs.cores import contention_warning, idle_cores_hint
 
 
 @pytest.mark.parametrize(
@@ -44,8 +47,8 @@ def test_the_load_is_the_mean_of_the_last_minute_if_the_system_has_it(monkeypatc
 
 @pytest.mark.parametrize(
     ("processes", "worlds", "available", "others"),
-    [(2, 16, 3, 0.0), (2, 16, 16, 12.2), (0, 8, 16, 0.0), (16, 2, 16, 0.0), (2, 1, 16, 0.0)],
-    ids=["three cores", "others use them", "one process on purpose", "all in use", "two worlds"],
+    [(2, 16, 3, 0.0), (2, 16, 16, 12.2), (16, 2, 16, 0.0), (2, 1, 16, 0.0)],
+    ids=["three cores", "others use them", "all in use", "two worlds"],
 )
 def test_no_hint_without_cores_or_worlds_for_twice_the_processes(
     processes, worlds, available, others
@@ -56,10 +59,10 @@ def test_no_hint_without_cores_or_worlds_for_twice_the_processes(
 @pytest.mark.parametrize(
     ("available", "others", "remedy"),
     [
-        (16, 0.0, "collect.processes=16 collect.worlds=2"),
-        (16, 3.2, "collect.processes=8 collect.worlds=4"),
-        (6, 0.0, "collect.processes=4 collect.worlds=8"),
-        (64, 0.0, "collect.processes=32 collect.worlds=1"),
+        (16, 0.0, "collect.groups=16 collect.worlds=2"),
+        (16, 3.2, "collect.groups=8 collect.worlds=4"),
+        (6, 0.0, "collect.groups=4 collect.worlds=8"),
+        (64, 0.0, "collect.groups=32 collect.worlds=1"),
     ],
 )
 def test_a_hint_names_processes_and_worlds_of_batches_of_the_same_size(available, others, remedy):
@@ -72,5 +75,25 @@ def test_a_run_with_cores_for_more_processes_logs_it(monkeypatch, caplog):
     monkeypatch.setattr(training, "usable_cores", lambda: 8)
     monkeypatch.setattr(training, "load", lambda: 0.0)
     with caplog.at_level(logging.INFO, logger="veca_marl"):
+        training._log_idle_cores(CollectCfg(processes=2))  # on purpose
+        assert not caplog.text
         training._log_idle_cores(CollectCfg())
-    assert "collect.processes=8 collect.worlds=1" in caplog.text
+    assert "collect.groups=8 collect.worlds=1" in caplog.text
+
+
+def test_cores_are_no_more_than_a_container_or_the_user_allows(monkeypatch, tmp_path):
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: set(range(8)), raising=False)
+    monkeypatch.delenv(CORES, raising=False)
+    quota = tmp_path / "cpu.max"
+    monkeypatch.setattr(process_cores, "_QUOTA", quota)
+    assert usable_cores() == 8
+    for text, number in (("max 100000", 8), ("250000 100000", 3), ("50000 100000", 1)):
+        quota.write_text(text)
+        assert usable_cores() == number
+    quota.write_text("max 100000")
+    monkeypatch.setenv(CORES, "2")
+    assert usable_cores() == 2
+    for wrong in ("0", "two", "-1", ""):
+        monkeypatch.setenv(CORES, wrong)
+        with pytest.raises(ValueError, match=naming(CORES, wrong)):
+            usable_cores()

@@ -114,7 +114,12 @@ def start():
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no groups of processes")
 def test_a_job_is_ended_by_sigterm_to_all_of_its_processes(tmp_path, start):
     """Slurm and systemd send it so; the workers may end before the process that started them."""
-    workers = ["collect.processes=2", "collect.worlds=1", "total_frames=1000000"]
+    workers = [
+        "collect.groups=2",
+        "collect.processes=2",
+        "collect.worlds=1",
+        "total_frames=1000000",
+    ]
     running = start(command(*SMOKE, *workers, "hydra.run.dir=run"), tmp_path, new_group=True)
     deadline = time.monotonic() + 300
     while not list(tmp_path.glob("run/checkpoints/frames_*")) and time.monotonic() < deadline:

@@ -32,10 +32,11 @@ from veca_marl.bench.command import machine_line
 from veca_marl.bench.rollouts import measure_rollouts
 from veca_marl.config import Config, ConfigError, compose
 from veca_marl.config.command_line import CommandLine, check_file
+from veca_marl.processes.cores import usable_cores
 from veca_marl.runs.assembly import GameFactory, make_learners, read_specs
-from veca_marl.runs.cores import usable_cores
 
 _LINKS_GBPS = (1.0, 10.0)
+_GROUPS = 2  # of worlds that a process plays, as in the default run on two cores
 _ROLLOUT_STEPS, _ROLLOUTS = 40, 3
 
 
@@ -111,7 +112,7 @@ def measure(options: ScaleOptions) -> Measured:
     torch.set_num_threads(1)
     cfg = compose([f"+task={options.task}"])
     _say("parts of a step")
-    rollouts = measure_rollouts(cfg.game, cfg.collect.worlds, _ROLLOUT_STEPS, _ROLLOUTS)
+    rollouts = measure_rollouts(cfg.game, _GROUPS * cfg.collect.worlds, _ROLLOUT_STEPS, _ROLLOUTS)
     learners = make_learners(cfg, read_specs(cfg.game), torch.device("cpu"))
     policy = learners.policy.copy()
     collection, batch = {}, TensorDict()
@@ -137,7 +138,9 @@ def _kinds(default: CollectCfg) -> dict[str, CollectCfg]:
     """Return the ways to collect that are measured, by their names."""
 
     def of(processes: int, engine: Engine = Engine.processes) -> CollectCfg:
-        return CollectCfg(processes, default.worlds, default.steps, engine=engine)
+        groups = _GROUPS * max(processes, 1)
+        numbers = (groups, default.worlds, default.steps)
+        return CollectCfg(*numbers, processes=processes, engine=engine)
 
     cores = usable_cores()
     kinds = {"the learner's process": of(0), "1 worker process": of(1)}
@@ -255,7 +258,7 @@ def page(measured: Measured, cores: Sequence[int]) -> str:
         task=measured.cfg.task.name,
         batches=measured.batches,
         machine=measured.machine,
-        worlds=collect.worlds,
+        worlds=_GROUPS * collect.worlds,
         steps=collect.steps,
         parts="\n".join(
             table(
@@ -335,7 +338,7 @@ def _cores_table(measured: Measured, cores: Sequence[int]) -> list[str]:
     for number in cores:
         cost = _costs(measured, number)
         rates = on_paper(cost.worlds_ms, cost.learner_ms, measured.learning.all_ms, number)
-        batch = number * collect.worlds * collect.steps
+        batch = number * _GROUPS * collect.worlds * collect.steps
         rows.append(
             (
                 f"{number}",

@@ -51,7 +51,13 @@ _BESIDE = ("parsers", "configurations")
 _LARGEST_BYTES = 8 * 2**30  # address space of what tries configurations: others use the memory too
 _SHARED_MEMORY = Path("/dev/shm")
 _RUN = (
-    *("collect.processes=2", "collect.worlds=1", "collect.steps=16", "task.max_seconds=0.5"),
+    *(
+        "collect.groups=2",
+        "collect.processes=2",
+        "collect.worlds=1",
+        "collect.steps=16",
+        "task.max_seconds=0.5",
+    ),
     *("eval.every_frames=64", "eval.episodes=2", "eval.worlds=2", "log=silent", "threads=1"),
 )
 

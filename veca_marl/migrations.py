@@ -137,6 +137,25 @@ class Replaced(Change):
         _replace(node, self.key, self.now, self.before)
 
 
+@dataclass(frozen=True)
+class Grouped(Change):
+    """Worker processes of equally many worlds, which became groups that any processes play."""
+
+    def apply(self, node: Plain) -> None:
+        """See `Change`."""
+        if "processes" in node and "groups" not in node:
+            before = node["processes"]
+            node |= {"groups": max(before, 1), "processes": None if before else 0}
+
+    def undo(self, node: Plain) -> None:
+        """See `Change`; groups that one process plays cannot be expressed, unless it is one."""
+        if "groups" in node and "processes" in node:
+            if node["processes"] is None:
+                node["processes"] = node.pop("groups")
+            elif node["processes"] == 0 and node["groups"] == 1:
+                del node["groups"]
+
+
 def _replace(node: Plain, key: str, before: Any, now: Any) -> None:
     if key in node and node[key] == before:
         node[key] = deepcopy(now)
@@ -219,6 +238,7 @@ STEPS: tuple[Step, ...] = (
             *(Added(body, _SIZE) for body in ("body", "team.*.body")),
         )
     ),
+    Step(changes=(Grouped("collect"),)),
 )
 """Entry `n` leads from version `n` to version ``n + 1``."""
 

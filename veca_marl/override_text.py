@@ -8,12 +8,17 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 _PATH = re.compile(r"(~|/|\./|\.\./)")
 _PLAIN = re.compile(r"[\w./:@+ -]*", re.ASCII)  # read unchanged without quotation marks
 _EXPONENT = re.compile(r"[+-]?\d+(\.\d*)?[eE]\+?\d+")
+
+
+def is_within(key: str, parts: Iterable[str]) -> bool:
+    """Return whether a dotted key is one of some parts of a configuration, or in one of them."""
+    return any(key == part or key.startswith(f"{part}.") for part in parts)
 
 
 def normalised(overrides: Sequence[str]) -> list[str]:

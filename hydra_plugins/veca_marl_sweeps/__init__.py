@@ -23,7 +23,7 @@ from hydra.utils import get_class
 from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
-from veca_marl.runs.cores import usable_cores
+from veca_marl.processes.cores import usable_cores
 from veca_marl.sweeps.names import fixed_in, folder_of, key_of, run_name, varied_in
 from veca_marl.sweeps.plans import Job, SweepError
 from veca_marl.sweeps.run_state import final_score, read_run, with_body_kinds

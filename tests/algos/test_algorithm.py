@@ -66,7 +66,7 @@ def make_trainer(tmp_path):
         return Trainer(
             make_env=make_env,
             learners=TeamLearners(specs, cfg, CPU, own),
-            collect=CollectCfg(0, worlds=4, steps=16),
+            collect=CollectCfg(1, worlds=4, steps=16, processes=0),
             evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=4, worlds=2),
             budget=Budget(batches * FRAMES),
             checkpoints=Checkpoints(folder / "checkpoints", Identity("Toy", specs), {}),
@@ -147,7 +147,9 @@ def test_buffers_of_exploration_reach_the_workers():
 
     learners = TeamLearners(specs_of(), ToyDQNCfg(epsilon=0.0), CPU)
     policy = learners.policy.copy()
-    experience = Experience(make_env, policy.collect, CollectCfg(2, worlds=2, steps=16))
+    experience = Experience(
+        make_env, policy.collect, CollectCfg(2, worlds=2, steps=16, processes=2)
+    )
     greedy = []
     for active in (True, False):
         learners.algorithms["agents"].warm_up.active.fill_(active)

@@ -31,7 +31,7 @@ def make_trainer(folder, processes=0):
     trainer = Trainer(
         make_env=make_env,
         learners=TeamLearners(specs, PPOCfg(network=SMALL, epochs=1), torch.device("cpu")),
-        collect=CollectCfg(processes, worlds=4 // max(processes, 1), steps=FRAMES // 4),
+        collect=CollectCfg(2, worlds=2, processes=processes, steps=FRAMES // 4),
         evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=2, worlds=2),
         budget=Budget(BATCHES * FRAMES),
         checkpoints=checkpoints,

@@ -11,7 +11,7 @@ from veca_marl.runs.served_worlds import ServedGames, game_text
 
 GAME = ("+task=KickTheBall", "playground=simple", "senses/vision=blind", "task.max_seconds=0.8")
 SHORT = (
-    "collect.processes=1",
+    "collect.groups=1",
     "collect.worlds=2",
     "collect.steps=32",
     "algo.minibatches=1",

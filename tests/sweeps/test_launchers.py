@@ -77,7 +77,7 @@ def test_optuna_gets_the_scores_of_its_trials(tmp_path, launcher):
 @pytest.mark.slow
 def test_submitit_runs_jobs_of_several_processes(tmp_path):
     words = ("hydra/launcher=submitit_local", "hydra.launcher.timeout_min=10", "seed=0,1")
-    runs = sweep(tmp_path, *words, "collect.processes=2", "collect.worlds=1")
+    runs = sweep(tmp_path, *words, "collect.groups=2", "collect.worlds=1")
     assert [frames(run) for run in runs] == [["64", "128", "192", "256"]] * 2
 
 

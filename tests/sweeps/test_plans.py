@@ -21,7 +21,7 @@ CONFIG = {
     "log": {"video": True},
     "experiment": {"name": "x", "arm": "a", "claims": []},
     "seed": 0,
-    "collect": {"processes": 2, "threads": 1},
+    "collect": {"groups": 2, "processes": None, "threads": 1},
 }
 
 
@@ -140,7 +140,7 @@ def test_what_a_run_has_decided_itself_does_not_differ():
 
 
 def test_runs_at_a_time_fill_the_cores():
-    small = {**CONFIG, "collect": {"processes": 0, "threads": 1}, "threads": 1}
+    small = {**CONFIG, "collect": {"groups": 2, "processes": 0, "threads": 1}, "threads": 1}
     assert (cores_of(CONFIG), cores_of(small), cores_of({**small, "threads": 4})) == (2, 1, 4)
     assert default_jobs([CONFIG] * 9, 16) == 8
     assert default_jobs([small] * 9, 16) == 9

@@ -83,7 +83,7 @@ def sac_sweep(tmp_path, monkeypatch):
         seen.clear()
         monkeypatch.setattr(storage, "available_memory", lambda: int(available_gb * 1e9))
         small = ["senses/vision=blind", "senses/touch=numb", "threads=1"]
-        small += ["collect.processes=1", "collect.threads=1"]
+        small += ["collect.groups=1", "collect.threads=1"]
         monkeypatch.setattr(sys, "argv", ["train", "-m", *SAC_SWEEP, *small, *words])
         TRAIN.main()
         return tuple(seen[:2])

@@ -20,10 +20,10 @@ from tools.fidelity.law import Section
 from tools.fidelity.page import number, write_page
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine, check_folder
+from veca_marl.processes.cores import usable_cores
 from veca_marl.processes.pool import ProcessPool
 from veca_marl.registry import unknown
 from veca_marl.reports.figure import PlotError, check_plotting
-from veca_marl.runs.cores import usable_cores
 
 SECTIONS: dict[str, str] = {
     "collisions": "tools.fidelity.mechanics.collisions",

@@ -15,7 +15,7 @@ from veca_marl.bench.learning import Learning, measure_learning
 from veca_marl.bench.rollouts import Rollouts, measure_rollouts
 from veca_marl.config import ConfigError, compose
 from veca_marl.plugins import conf_dir
-from veca_marl.runs.cores import usable_cores
+from veca_marl.processes.cores import usable_cores
 from veca_marl.sim.body import BodyCfg
 
 

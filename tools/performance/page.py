@@ -83,8 +83,8 @@ write their own times to `timing.txt`.
 ### Several worlds in each process
 
 Work that is neither physics nor senses is done once per environment step, however many worlds the
-environment has. Use several worlds in each process (`collect.worlds`), and as many processes as
-there are cores (`collect.processes`).
+environment has. Use several worlds in each process: `collect.groups`
+times `collect.worlds`, divided by the number of cores.
 
 {worlds}
 

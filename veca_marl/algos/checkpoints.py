@@ -28,6 +28,7 @@ from veca_marl.algos.checkpoint_files import (
 from veca_marl.algos.files import WriteError, left_behind, write_atomically
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.migrations import CONFIG_VERSION, KEY
+from veca_marl.override_text import is_within
 
 __all__ = [
     "FORMAT",
@@ -156,7 +157,7 @@ def check_config(
         path: The checkpoint.
         stored: Its configuration as plain data.
         config: That of the run that is to continue.
-        may_change: First parts of the keys in which they may differ.
+        may_change: Keys, or parts of the configuration, in which they may differ.
         is_default: Whether a dotted key of `config` is a field, with its default value.
 
     Raises:
@@ -165,7 +166,7 @@ def check_config(
     differing = [
         f"{name} was {_shown(before)}, is {_shown(now)}"
         for name, before, now in _differences(stored, config)
-        if name.partition(".")[0] not in may_change and not (before == _ABSENT and is_default(name))
+        if not is_within(name, may_change) and not (before == _ABSENT and is_default(name))
     ]
     if differing:
         raise CheckpointError(

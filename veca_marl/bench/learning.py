@@ -26,9 +26,9 @@ from veca_marl.algos.training.schedule import Schedule, processor_seconds
 from veca_marl.bench.rollouts import RandomActions
 from veca_marl.config import Config
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.processes.cores import usable_cores
 from veca_marl.processes.pool import ProcessPool
 from veca_marl.runs.assembly import GameFactory, make_trainer
-from veca_marl.runs.cores import usable_cores
 from veca_marl.runs.run_folder import RunFolder
 
 _WAIT_S = 60.0  # until all processes begin; they differ by the time to read a message

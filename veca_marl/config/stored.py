@@ -19,7 +19,7 @@ from veca_marl.config.root import body_types, root_schema
 from veca_marl.envs.core.game_cfg import TeamCfg
 from veca_marl.envs.core.task import find_task
 from veca_marl.migrations import migrated
-from veca_marl.override_text import normalised
+from veca_marl.override_text import is_within, normalised
 from veca_marl.plugins import PLUGINS
 from veca_marl.sim.body import BODIES
 from veca_marl.sim.physics import PLAYGROUND_GENERATORS
@@ -162,7 +162,7 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
     Args:
         node: The configuration; it is changed.
         overrides: In Hydra's grammar.
-        allowed: Keys of the root that may be changed.
+        allowed: Keys, or parts of the configuration, that may be changed.
 
     Raises:
         ConfigError: If another key is to be changed, or a choice or a value does not exist.
@@ -174,7 +174,7 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
         if path == ["task"]:
             _require_same_task(node, override)
             continue
-        if path[0] not in allowed:
+        if not is_within(".".join(path), allowed):
             choices = ", ".join("task.FIELD" if key == "task" else key for key in allowed)
             raise ConfigError(f"{override.input_line}: of a run, only {choices} can be changed")
         if path[0] == "team" and len(path) > 1 and path[1] not in node.team:

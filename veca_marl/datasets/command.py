@@ -30,9 +30,9 @@ from veca_marl.datasets.baselines.training import TrainOptions, as_json, lines, 
 from veca_marl.datasets.configuration import DatasetConfig, compose_dataset
 from veca_marl.datasets.dataset import DATASETS, NoSceneError
 from veca_marl.datasets.storage import DatasetError, load
+from veca_marl.processes.cores import usable_cores
 from veca_marl.processes.supervision import WorkerError
 from veca_marl.registry import unknown
-from veca_marl.runs.cores import usable_cores
 
 _ERRORS = (DatasetError, NoSceneError, WriteError, WorkerError)
 

@@ -37,8 +37,8 @@ from veca_marl.demonstrations.export.lerobot_format import export_lerobot
 from veca_marl.demonstrations.export.minari_format import export_minari
 from veca_marl.demonstrations.record import Recording, make_card, record
 from veca_marl.demonstrations.table import TableOptions, make_table
+from veca_marl.processes.cores import usable_cores
 from veca_marl.processes.supervision import WorkerError
-from veca_marl.runs.cores import usable_cores
 from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import provenance
 

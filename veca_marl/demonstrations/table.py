@@ -30,8 +30,8 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
 from veca_marl.envs.core.benchmark import EPISODES, find_benchmark
 from veca_marl.play.session import InTurn
+from veca_marl.processes.cores import usable_cores
 from veca_marl.runs.continuation import read_progress
-from veca_marl.runs.cores import usable_cores
 from veca_marl.runs.lock import locked
 from veca_marl.runs.run_folder import provenance, stored_actors
 from veca_marl.stored_files import read_json

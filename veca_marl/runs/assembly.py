@@ -30,6 +30,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.labelled import LabelledEnv
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
+from veca_marl.processes.cores import usable_cores
 from veca_marl.runs.continuation import RESUMABLE, is_default
 from veca_marl.runs.demonstrations import open_demonstrations
 from veca_marl.runs.run_folder import RunFolder
@@ -296,7 +297,8 @@ def _game_factory(cfg: Config) -> GameFactory | ServedGames:
     if cfg.collect.server is None:
         return GameFactory(cfg.game, tuple(cfg.plugins))
     served = ServedGames(cfg.collect.server, cfg.collect.key)
-    served.check(cfg.game, max(cfg.collect.worlds, cfg.eval.worlds))
+    processes = max(cfg.collect.processes_on(usable_cores()), 1)
+    served.check(cfg.game, max(cfg.collect.all_worlds // processes, cfg.eval.worlds))
     return served
 
 
@@ -436,4 +438,4 @@ def storage_of(cfg: Config) -> dict[str, StorageNeeded]:
 
 def _process_bytes(cfg: Config) -> int:
     """Return the memory of the learner, of processes that collect, and of as many that evaluate."""
-    return _LEARNER_BYTES + 2 * cfg.collect.processes * _OTHER_BYTES
+    return _LEARNER_BYTES + 2 * cfg.collect.processes_on(usable_cores()) * _OTHER_BYTES

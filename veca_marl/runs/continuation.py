@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from veca_marl.override_text import quoted
+from veca_marl.override_text import is_within, quoted
 from veca_marl.stored_files import StoredFileError, read_json
 
 FILE = "progress.json"
@@ -61,12 +61,20 @@ def resume_argument(path: str | Path) -> str:
     return shlex.quote(f"resume={value}")
 
 
-RESUMABLE = ("resume", "total_frames", "max_minutes", "device", "threads", "log")
+RESUMABLE = (
+    "resume",
+    "total_frames",
+    "max_minutes",
+    "device",
+    "threads",
+    "log",
+    "collect.processes",
+)
 
 
 def may_change(key: str) -> bool:
     """Return whether a key of the configuration, such as ``log.video``, may be changed."""
-    return key.partition(".")[0] in RESUMABLE
+    return is_within(key, RESUMABLE)
 
 
 def is_default(cfg: Any, key: str) -> bool:

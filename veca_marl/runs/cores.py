@@ -6,13 +6,6 @@ import math
 import os
 
 
-def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def load() -> float:
     """Return the mean number of threads that ran in the last minute; 0 where it is not known."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
@@ -42,14 +35,14 @@ def contention_warning(threads: int, cores: int, others: float) -> str:
     )
 
 
-def idle_cores_hint(processes: int, worlds: int, cores: int, others: float) -> str:
-    """Return a sentence for the log if more worker processes could step the same worlds.
+def idle_cores_hint(groups: int, worlds: int, cores: int, others: float) -> str:
+    """Return a sentence for the log if more worker processes could step as many worlds.
 
-    The number of processes is part of the configuration of a run, not of the machine: each has its
+    The number of groups is part of the configuration of a run, not of the machine: each has its
     own random numbers, so that a run gives other results with another number.
 
     Args:
-        processes: Worker processes of the run; with 0 the learner's process steps the worlds.
+        groups: Groups of worlds of the run, each of which has a worker process.
         worlds: Worlds of each of them.
         cores: Cores that they may use.
         others: Mean number of threads that ran before this run, see `load`.
@@ -57,12 +50,12 @@ def idle_cores_hint(processes: int, worlds: int, cores: int, others: float) -> s
     Returns:
         The sentence; empty if there are no cores for at least twice as many processes.
     """
-    total, free = processes * worlds, cores - math.ceil(others)
+    total, free = groups * worlds, cores - math.ceil(others)
     more = max((n for n in range(1, min(total, free) + 1) if total % n == 0), default=0)
-    if processes == 0 or more < 2 * processes:
+    if more < 2 * groups:
         return ""
     return (
-        f"{processes} worker processes step {total} worlds on {cores} cores: "
-        f"collect.processes={more} collect.worlds={total // more} makes batches of the same size "
+        f"{groups} worker processes step {total} worlds on {cores} cores: "
+        f"collect.groups={more} collect.worlds={total // more} makes batches of the same size "
         "on more of them, from other random numbers"
     )

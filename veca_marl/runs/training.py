@@ -17,10 +17,11 @@ from veca_marl.algos.reporting import MemoryReporter, Reporter, Row
 from veca_marl.algos.training.loop import Trainer
 from veca_marl.config import Config
 from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.processes.cores import usable_cores
 from veca_marl.processes.supervision import WorkerError
 from veca_marl.runs.assembly import make_reporters, make_trainer
 from veca_marl.runs.continuation import RunProgress
-from veca_marl.runs.cores import contention_warning, idle_cores_hint, load, usable_cores
+from veca_marl.runs.cores import contention_warning, idle_cores_hint, load
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.runs.video import animated_gif, record_episode
 
@@ -173,9 +174,10 @@ def _warn_of_contention() -> None:
 
 def _log_idle_cores(collect: CollectCfg) -> None:
     """Log that more processes could step the worlds, if there are cores for them."""
-    if collect.engine is Engine.ray:  # the cores of a cluster are those that were reserved
+    # the cores of a cluster are those that were reserved
+    if collect.engine is Engine.ray or collect.processes is not None:
         return
-    hint = idle_cores_hint(collect.processes, collect.worlds, usable_cores(), load())
+    hint = idle_cores_hint(collect.groups, collect.worlds, usable_cores(), load())
     if hint:
         _LOG.info(hint)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
 from veca_marl.processes.children import end_all, end_of
+from veca_marl.processes.cores import CORES
 from veca_marl.runs.continuation import read_progress
 from veca_marl.sweeps.plans import Action, Job, Plan, SweepError, plan
 
@@ -179,7 +180,8 @@ def _start(
 ) -> None:
     job = plan.job
     job.log.parent.mkdir(parents=True, exist_ok=True)
-    environment = {"OMP_NUM_THREADS": str(threads), **os.environ, PARENT: str(os.getpid())}
+    share = {"OMP_NUM_THREADS": str(threads), CORES: str(threads)}
+    environment = {**share, **os.environ, PARENT: str(os.getpid())}
     with job.log.open("ab") as log:
         try:
             _lock(log)
@@ -260,7 +262,8 @@ def cores_of(config: Mapping[str, Any]) -> int:
     a number of threads uses what is left.
     """
     collect = config["collect"]
-    return int(max(1, collect["processes"] * collect["threads"], config["threads"] or 1))
+    processes = collect["groups"] if collect["processes"] is None else collect["processes"]
+    return int(max(1, processes * collect["threads"], config["threads"] or 1))
 
 
 def default_jobs(configs: list[Mapping[str, Any]], cores: int) -> int:

@@ -13,7 +13,7 @@ from veca_marl.algos.collection.host_limits import (
 )
 from veca_marl.runs.assembly import make_trainer, read_specs
 
-CFG = CollectCfg(processes=2, worlds=16, steps=32)
+CFG = CollectCfg(2, worlds=16, steps=32, processes=2)
 
 
 @pytest.fixture(scope="module")

@@ -82,7 +82,7 @@ def start(make_ppo):
 
     def start(make_env=only_audio, engine=Engine.ray, steps=8, **numbers):
         policy = make_ppo(senses=("audio",)).policy.copy()
-        cfg = CollectCfg(ACTORS, worlds=1, steps=steps, engine=engine, **numbers)
+        cfg = CollectCfg(ACTORS, 1, steps, processes=ACTORS, engine=engine, **numbers)
         made.append(Experience(make_env, policy.collect, cfg))
         made[-1].policy = policy
         return made[-1]
@@ -178,7 +178,7 @@ def check_that_none_is_left(processes):
 
 
 TRAIN = [
-    *("-m", "veca_marl.train", "+task=KickTheBall", "collect=ray", f"collect.processes={ACTORS}"),
+    *("-m", "veca_marl.train", "+task=KickTheBall", "collect=ray", f"collect.groups={ACTORS}"),
     *("collect.worlds=1", "collect.steps=16", "log=csv", "log.video=false", "eval.worlds=1"),
     *("eval.episodes=1", "eval.every_frames=6400", "total_frames=64000", "threads=1"),
 ]
@@ -258,4 +258,4 @@ def test_without_ray_the_extra_is_named(monkeypatch):
 
 def test_actors_are_at_least_one():
     with pytest.raises(ValueError, match=naming("collect.engine=ray", "collect.processes=0")):
-        CollectCfg(0, engine=Engine.ray)
+        CollectCfg(processes=0, engine=Engine.ray)

@@ -47,7 +47,7 @@ def start(make_ppo):
 
     def start(make_env=make_fake_env, steps=STEPS, **numbers):
         policy = make_ppo(senses=("audio",)).policy.copy()
-        cfg = CollectCfg(2, worlds=1, steps=steps, **numbers)
+        cfg = CollectCfg(2, worlds=1, steps=steps, **numbers, processes=2)
         made.append(Experience(make_env, policy.collect, cfg))
         return made[-1]
 
@@ -295,7 +295,7 @@ from torchrl.envs.utils import RandomPolicy
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 
 policy = RandomPolicy(make_fake_env(1, 0).action_spec)
-experience = Experience(make_fake_env, policy, CollectCfg(2, worlds=1, steps=100_000))
+experience = Experience(make_fake_env, policy, CollectCfg(2, worlds=1, steps=100_000, processes=2))
 print(*(process.pid for process in experience._collector.procs), flush=True)
 experience.collect()
 """
@@ -333,7 +333,7 @@ signal.signal(signal.SIGINT, end)
 signal.signal(signal.SIGTERM, end)
 specs = team_specs(FakeEnv(1, senses=("audio",)))
 policy = TeamLearners(specs, PPOCfg(), torch.device("cpu")).policy.copy()
-Experience(make_env, policy.collect, CollectCfg(2, worlds=1))
+Experience(make_env, policy.collect, CollectCfg(2, worlds=1, processes=2))
 """
 
 CLOSING_PROCESS = """
@@ -349,7 +349,7 @@ from veca_marl.algos.training.learners import TeamLearners
 
 def main():
     policy = TeamLearners(team_specs(FakeEnv(1)), PPOCfg(), torch.device("cpu")).policy.copy()
-    experience = Experience(make_fake_env, policy.collect, CollectCfg(2, worlds=1))
+    experience = Experience(make_fake_env, policy.collect, CollectCfg(2, worlds=1, processes=2))
     experience.restart(0)
     experience.close()
 
@@ -379,7 +379,8 @@ if __name__ == "__main__":
     torch.set_num_threads(2)
     compute_in_parallel()
     policy = RandomPolicy(make_fake_env(2, 0).action_spec)
-    experience = Experience(make_env, policy, CollectCfg(1, worlds=2, steps=4, threads=2))
+    cfg = CollectCfg(1, worlds=2, steps=4, threads=2, processes=1)
+    experience = Experience(make_env, policy, cfg)
     print(*experience.collect().batch_size)
     experience.close()
 """

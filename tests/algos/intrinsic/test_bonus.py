@@ -55,7 +55,7 @@ def make_trainer(tmp_path):
         return Trainer(
             make_env=make_env,
             learners=learners,
-            collect=CollectCfg(0, worlds=4, steps=16),
+            collect=CollectCfg(1, worlds=4, steps=16, processes=0),
             evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=4, worlds=2),
             budget=Budget(batches * FRAMES),
             checkpoints=Checkpoints(folder / "checkpoints", Identity("Toy", learners.specs), {}),
@@ -200,7 +200,9 @@ def last_reward(intrinsic, batches, enough=0.3):
     specs = team_specs(make_chain(1, 0))
     learners = TeamLearners(specs, algo, CPU, intrinsic={"agents": intrinsic})
     policy = learners.policy.copy()
-    experience = Experience(make_chain, policy.collect, CollectCfg(0, worlds=16, steps=32))
+    experience = Experience(
+        make_chain, policy.collect, CollectCfg(1, worlds=16, steps=32, processes=0)
+    )
     experience.restart(0)
 
     def learn():

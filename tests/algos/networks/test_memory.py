@@ -48,7 +48,7 @@ def first_heard(rows):
 @pytest.mark.parametrize("processes", [0, 2], ids=["in_process", "two_processes"])
 def test_memory_lasts_for_an_episode_and_no_longer(processes):
     learners = make_learners()
-    cfg = CollectCfg(processes, worlds=4 // max(processes, 1), steps=16)
+    cfg = CollectCfg(2, worlds=2, processes=processes, steps=16)
     experience = Experience(make_show_once, learners.policy.copy().collect, cfg)
     experience.restart(3)
     first = experience.collect()
@@ -72,7 +72,7 @@ def make_trainer(folder, reporters=()):
     return Trainer(
         make_env=make_show_once,
         learners=TeamLearners(specs, PPOCfg(network=GRU, sequence_steps=8), CPU),
-        collect=CollectCfg(0, worlds=4, steps=16),
+        collect=CollectCfg(1, worlds=4, steps=16, processes=0),
         evaluation=EvalCfg(every_frames=FRAMES, episodes=2, worlds=2),
         budget=Budget(3 * FRAMES),
         checkpoints=Checkpoints(folder, Identity("Toy", specs), {}),
@@ -132,7 +132,7 @@ def test_a_frozen_policy_with_memory_plays_against_a_learner_without():
     experience = Experience(
         lambda worlds, seed: make_show_once(worlds, seed, teams=TEAMS),
         learners.policy.copy().collect,
-        CollectCfg(0, worlds=4, steps=16),
+        CollectCfg(1, worlds=4, steps=16, processes=0),
     )
     experience.restart(0)
     batch = experience.collect()

@@ -127,7 +127,7 @@ def test_toy_is_learnt(make_ppo, discrete, teams):
     experience = Experience(
         lambda worlds, seed: FakeEnv(worlds, seed, **env),
         player.collect,
-        CollectCfg(processes=0, worlds=8, steps=32),
+        CollectCfg(1, worlds=8, steps=32, processes=0),
     )
     experience.restart(0)
 
@@ -244,4 +244,4 @@ def test_defaults_are_the_papers_table():
     assert table == (0.99, 0.95, 0.2, 0.03, 5.0)
     assert (cfg.epochs, cfg.minibatches, cfg.value_coefficient) == (4, 4, 0.5)
     collect = CollectCfg()
-    assert collect.processes * collect.worlds == 8
+    assert collect.all_worlds == 8

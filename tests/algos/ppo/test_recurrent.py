@@ -35,7 +35,7 @@ def collected(network=GRU, agents=2, **numbers):
     experience = Experience(
         lambda worlds, seed: make_show_once(worlds, seed, **env),
         deepcopy(ppo.actor),
-        CollectCfg(0, WORLDS, STEPS),
+        CollectCfg(1, WORLDS, STEPS, processes=0),
     )
     experience.restart(0)
     experience.collect()
@@ -128,7 +128,7 @@ def trained_return(memory, iterations):
     numbers = PPOCfg(network=network, sequence_steps=16, learning_rate=1e-3, max_learning_rate=3e-3)
     learners = TeamLearners(team_specs(make_cue(1, 0)), numbers, CPU)
     player = learners.policy.copy()
-    experience = Experience(make_cue, player.collect, CollectCfg(0, 16, 16))
+    experience = Experience(make_cue, player.collect, CollectCfg(1, 16, 16, processes=0))
     experience.restart(0)
     for _ in range(iterations):
         learners.learn(experience.collect())

@@ -74,7 +74,7 @@ def sampled(network=GRU, span=(3, 4, 2)):
     cfg = SACCfg(network=network, batch_size=64, **NUMBERS)
     cfg = replace(cfg, burn_in=span[0], sequence_steps=span[1], steps=span[2])
     sac = SAC("agents", team_specs(make_env(1, 0))["agents"], cfg, CPU)
-    experience = Experience(make_env, sac.actor, CollectCfg(0, worlds=4, steps=16))
+    experience = Experience(make_env, sac.actor, CollectCfg(1, worlds=4, steps=16, processes=0))
     experience.restart(0)
     for _ in range(3):
         sac.replay.extend(experience.collect())
@@ -199,7 +199,7 @@ def trained_return(memory, batches):
     network = replace(GRU, trunk_features=16, memory=memory)
     spec = team_specs(make_cue(1, 0))["agents"]
     sac = SAC("agents", spec, SACCfg(network=network, **NUMBERS), CPU)
-    experience = Experience(make_cue, sac.explorer, CollectCfg(0, worlds=16, steps=16))
+    experience = Experience(make_cue, sac.explorer, CollectCfg(1, worlds=16, steps=16, processes=0))
     experience.restart(0)
     for _ in range(batches):
         sac.learn(experience.collect())

@@ -38,7 +38,7 @@ def make(tmp_path, make_ppo):
         return Trainer(
             make_env=make_env,
             learners=algorithm,
-            collect=CollectCfg(0, worlds=4, steps=16),
+            collect=CollectCfg(1, worlds=4, steps=16, processes=0),
             evaluation=EvalCfg(every_frames=every * FRAMES, episodes=2, worlds=2),
             budget=Budget(batches * FRAMES),
             checkpoints=Checkpoints(folder / "checkpoints", identity, {}),

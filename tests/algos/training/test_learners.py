@@ -49,7 +49,7 @@ def make_trainer(tmp_path):
         trainer = Trainer(
             make_env=make_env,
             learners=TeamLearners(specs, PPOCfg(network=SMALL), CPU, frozen=frozen),
-            collect=CollectCfg(0, worlds=4, steps=16),
+            collect=CollectCfg(1, worlds=4, steps=16, processes=0),
             evaluation=EvalCfg(every_frames=FRAMES, episodes=4, final_episodes=4, worlds=2),
             budget=Budget(batches * FRAMES),
             checkpoints=Checkpoints(tmp_path, Identity("Toy", specs), {}, keep_last=9),

@@ -21,7 +21,7 @@ def make_trainer(tmp_path, make_ppo):
         return Trainer(
             make_env=make_fake_env,
             learners=make_ppo(seed=seed),
-            collect=CollectCfg(processes, worlds=4 // max(processes, 1), steps=16),
+            collect=CollectCfg(2, worlds=2, processes=processes, steps=16),
             evaluation=EvalCfg(every_frames=2 * FRAMES, episodes=2, final_episodes=4, worlds=2),
             budget=Budget(batches * FRAMES, **kwargs),
             checkpoints=Checkpoints(folder / "checkpoints", identity, {}),

@@ -25,9 +25,9 @@ import torch
 from ray.exceptions import RayActorError, RayError, RayTaskError
 from tensordict import TensorDict, TensorDictBase
 from torch import nn
-from torchrl.collectors import Collector
 from torchrl.collectors.distributed import RayCollector
 
+from veca_marl.algos.collection.groups import GroupCollector
 from veca_marl.processes.supervision import CHECK_S, Limit, TimeLimit, WorkerError
 
 _SAME = ("veca_marl", "torch", "torchrl", "numpy", "pybullet")
@@ -39,14 +39,14 @@ _QUIET: dict[str, Any] = {
 }
 
 
-class ActorCollector(Collector):
+class ActorCollector(GroupCollector):
     """The collector in an actor.
 
     Args:
-        *args: As for `Collector`.
+        *args: As for `GroupCollector`.
         threads: Torch threads of the actor.
         versions: Versions of packages on the learner's machine; others give other bytes.
-        **kwargs: As for `Collector`.
+        **kwargs: As for `GroupCollector`.
 
     Raises:
         RuntimeError: If a package has another version here.
@@ -66,13 +66,12 @@ class ActorCollector(Collector):
         """Be true before there is a length: Ray asks when it reports an error of `__init__`."""
         return True
 
-    def begin(self, seed: int) -> int:
-        """Seed worlds and policy as TorchRL's worker processes do; return the next seed."""
-        following = int(self.set_seed(seed))
+    def begin(self, seed: int) -> None:
+        """Seed worlds and policy as TorchRL's worker processes do."""
+        self.set_seed(seed)
         torch.manual_seed(seed)
         np.random.seed(seed)  # noqa: NPY002  as they do
         self.reset()
-        return following
 
     def take(self, weights: TensorDictBase) -> None:
         """Let the policy have new parameters and buffers."""
@@ -130,7 +129,7 @@ class SupervisedRayCollector(RayCollector):
                 policy,
                 sync=True,
                 collector_class=ActorCollector,
-                collector_kwargs=[dict(own) for _ in make_envs],
+                collector_kwargs=[own | {"process": i} for i in range(len(make_envs))],
                 remote_configs={"num_cpus": threads, "max_restarts": 0},
                 weight_sync_schemes={},
                 **kwargs,
@@ -152,9 +151,8 @@ class SupervisedRayCollector(RayCollector):
         self.where = self._answers("where")
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seed the actors one after the other, as worker processes are."""
-        for index, actor in enumerate(self.remote_collectors):
-            (seed,) = self._received([actor.begin.remote(seed)], first=index)
+        """Seed all actors, as worker processes are."""
+        self._answers("begin", seed)
         return seed
 
     def reset(self) -> None:
@@ -180,9 +178,9 @@ class SupervisedRayCollector(RayCollector):
         calls = [getattr(actor, method).remote(*arguments) for actor in self.remote_collectors]
         return self._received(calls)
 
-    def _received(self, calls: list[Any], first: int = 0) -> list[Any]:
-        """Wait for calls of consecutive actors; a failed or silent one is an error."""
-        numbers = {call: first + i for i, call in enumerate(calls)}
+    def _received(self, calls: list[Any]) -> list[Any]:
+        """Wait for calls of all actors; a failed or silent one is an error."""
+        numbers = {call: i for i, call in enumerate(calls)}
         limit = TimeLimit(self._limit.seconds, self._abandon)
         waiting = list(calls)
         while waiting:
@@ -233,8 +231,8 @@ def _connect(cores: int) -> None:
     found = _cores("cluster")
     if found < cores:
         raise WorkerError(
-            f"the actors need {cores} cores (collect.processes times collect.threads) and the "
-            f"cluster of Ray has {found:g}"
+            f"the actors need {cores} cores, collect.threads each, and the cluster of Ray has "
+            f"{found:g}"
         )
 
 

@@ -16,12 +16,13 @@ import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import multiprocessing
-from torchrl.collectors import Collector
 from torchrl.envs import Compose, EnvBase
 
+from veca_marl.algos.collection.groups import GroupCollector, GroupedPolicy
 from veca_marl.algos.collection.workers import SupervisedCollector
 from veca_marl.algos.networks.memory import memory_of, with_transform
 from veca_marl.algos.specs import EnvFactory
+from veca_marl.processes.cores import usable_cores
 from veca_marl.processes.supervision import Limit
 
 
@@ -45,9 +46,12 @@ class CollectCfg:
     as many worlds and batches of the same size.
 
     Attributes:
-        processes: Worker processes; 0 steps the worlds in this one.
-        worlds: Worlds in each process; one call of the policy acts for all of them.
+        groups: Groups of worlds. A run depends on their number: each has its own random numbers.
+        worlds: Worlds in each group; one call of the policy acts for all of them.
         steps: Steps of each world in a batch.
+        processes: Worker processes, each of which plays as many groups; 0 plays them in this
+            process. A run does not depend on their number. None is as many as there are cores, and
+            at most one for each group; with actors or a server one for each group.
         threads: Torch threads of each worker process; with more than 1, workers take some seconds
             longer to start.
         answer_limit_s: Seconds that a worker process may take to start, for a batch, a reset, new
@@ -61,9 +65,10 @@ class CollectCfg:
             Without a cluster they are on this machine.
     """
 
-    processes: int = 2
+    groups: int = 2
     worlds: int = 4
     steps: int = 128
+    processes: int | None = None
     threads: int = 1
     answer_limit_s: float = 600.0
     server: str | None = None
@@ -71,11 +76,14 @@ class CollectCfg:
     engine: Engine = Engine.processes
 
     def __post_init__(self) -> None:
-        if self.processes < 0:
-            raise ValueError(f"collect.processes must be 0 or more, got {self.processes}")
-        for name in ("worlds", "steps", "threads"):
+        for name in ("groups", "worlds", "steps", "threads"):
             if getattr(self, name) < 1:
                 raise ValueError(f"collect.{name} must be at least 1, got {getattr(self, name)}")
+        if self.processes is not None and self.processes not in (0, *self._divisors):
+            raise ValueError(
+                f"collect.processes={self.processes} must be null, 0 or a divisor of "
+                f"collect.groups={self.groups}: {', '.join(map(str, self._divisors))}"
+            )
         if not self.answer_limit_s > 0:
             raise ValueError(f"collect.answer_limit_s must be positive, got {self.answer_limit_s}")
         if self.engine is Engine.ray and self.processes == 0:
@@ -87,9 +95,21 @@ class CollectCfg:
         return Limit(self.answer_limit_s, "collect.answer_limit_s")
 
     @property
+    def _divisors(self) -> list[int]:
+        return [n for n in range(1, self.groups + 1) if self.groups % n == 0]
+
+    @property
     def all_worlds(self) -> int:
-        """Worlds of all processes."""
-        return max(self.processes, 1) * self.worlds
+        """Worlds of all groups."""
+        return self.groups * self.worlds
+
+    def processes_on(self, cores: int) -> int:
+        """Return the number of worker processes on a machine with some cores."""
+        if self.processes is not None:
+            return self.processes
+        if self.engine is Engine.ray or self.server is not None:
+            return self.groups
+        return max(n for n in self._divisors if n <= max(cores, 1))
 
     @property
     def frames(self) -> int:
@@ -154,22 +174,25 @@ class Experience:
 
     def __init__(self, make_env: EnvFactory, policy: TensorDictModuleBase, cfg: CollectCfg) -> None:
         self.cfg = cfg
-        make = partial(_make_env, make_env, cfg.worlds, memory_of(policy))
+        self._processes = processes = cfg.processes_on(usable_cores())
+        parts = max(processes, 1)
+        make = partial(_make_env, make_env, cfg.all_worlds // parts, memory_of(policy))
+        player = GroupedPolicy(policy, cfg.groups // parts)
         common = {
             "frames_per_batch": cfg.frames,
             "total_frames": -1,
             "auto_register_policy_transforms": False,  # cannot know which flag resets the memory
         }
-        if cfg.processes == 0:
-            self._collector = Collector(make, policy, **common)
+        if processes == 0:
+            self._collector = GroupCollector(make, player, **common)
         elif cfg.engine is Engine.ray:
-            self._collector = _with_actors(make, policy, cfg, common)
+            self._collector = _with_actors([make] * processes, player, cfg, common)
         else:
             threads = torch.get_num_threads()
             with _start_method(start_method(cfg.threads)):
                 self._collector = SupervisedCollector(
-                    [make] * cfg.processes,
-                    policy,
+                    [make] * processes,
+                    player,
                     cat_results="stack",
                     num_threads=threads,
                     num_sub_threads=cfg.threads,
@@ -182,10 +205,14 @@ class Experience:
         """Start new episodes in all worlds; what follows depends on `seed` and the policy alone."""
         torch.manual_seed(seed)
         self._collector.set_seed(seed)
-        self._collector.reset()
+        if self._processes == 0:  # collectors in other processes reset their worlds
+            self._collector.reset()
 
     def collect(self) -> TensorDictBase:
-        """Return the next batch, ``(processes * worlds, steps)``."""
+        """Return the next batch, ``(groups * worlds, steps)``."""
+        if self._processes == 0:
+            with threads(self.cfg.threads):
+                return next(self._batches)
         batch = next(self._batches)
         return batch if batch.ndim == 2 else batch.flatten(0, 1)
 
@@ -205,12 +232,12 @@ def _make_env(make_env: EnvFactory, worlds: int, memory: Compose | None) -> EnvB
 
 
 def _with_actors(
-    make: Callable[[], EnvBase], policy: TensorDictModuleBase, cfg: CollectCfg, common: Any
+    makers: list[Callable[[], EnvBase]], policy: GroupedPolicy, cfg: CollectCfg, common: Any
 ) -> Any:
     """Return the collector of Ray's actors; its module needs the extra ``[ray]``."""
     actors = import_module("veca_marl.algos.collection.actors")
     return actors.SupervisedRayCollector(
-        [make] * cfg.processes, policy, limit=cfg.limit, threads=cfg.threads, **common
+        makers, policy, limit=cfg.limit, threads=cfg.threads, **common
     )
 
 
@@ -223,6 +250,17 @@ def _start_method(name: str) -> Iterator[None]:
         yield
     finally:
         multiprocessing.set_start_method(previous, force=True)
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Compute with as many threads as worker processes have: others may sum in another order."""
+    previous = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(previous)
 
 
 def start_method(threads: int) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from veca_marl.algos.collection.experience import CollectCfg, Engine
 from veca_marl.algos.specs import TeamSpec
+from veca_marl.processes.cores import usable_cores
 
 SHARED_MEMORY = Path("/dev/shm")
 
@@ -44,7 +45,11 @@ def shared_bytes(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
 
 def _shares(cfg: CollectCfg) -> bool:
     """Return whether batches are in shared memory; Ray writes what has no room there to disk."""
-    return cfg.processes > 0 and cfg.engine is Engine.processes
+    return _processes(cfg) > 0 and cfg.engine is Engine.processes
+
+
+def _processes(cfg: CollectCfg) -> int:
+    return cfg.processes_on(usable_cores())
 
 
 def open_files(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
@@ -52,7 +57,7 @@ def open_files(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> int:
     if not _shares(cfg):
         return 0
     arrays = sum(len(spec.observations) + len(spec.actions) for spec in specs.values())
-    return _BASE_FILES + cfg.processes * (_FILES_PER_PROCESS + _FILES_PER_ARRAY * arrays)
+    return _BASE_FILES + _processes(cfg) * (_FILES_PER_PROCESS + _FILES_PER_ARRAY * arrays)
 
 
 def available_shared_memory() -> int | None:
@@ -93,8 +98,8 @@ def that_fits(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> tuple[CollectCf
         specs: The arrays of each team.
 
     Returns:
-        `cfg` and an empty text if it fits; otherwise the same number of worlds in the process of
-        the learner, and a sentence for the log.
+        `cfg` and an empty text if it fits; otherwise the same worlds in the process of the learner,
+        and a sentence for the log.
     """
     shortages = []
     bytes_needed, free = shared_bytes(cfg, specs), available_shared_memory()
@@ -109,8 +114,7 @@ def that_fits(cfg: CollectCfg, specs: Mapping[str, TeamSpec]) -> tuple[CollectCf
         shortages.append(f"{files_needed} open files, {allowed} are allowed (ulimit -n)")
     if not shortages:
         return cfg, ""
-    one = replace(cfg, processes=0, worlds=cfg.all_worlds)
-    return one, (
-        f"collect.processes={cfg.processes} needs {' and '.join(shortages)}: all {one.worlds} "
-        "worlds are stepped in one process instead, which is slower and draws other random numbers"
+    return replace(cfg, processes=0), (
+        f"collect.processes={_processes(cfg)} needs {' and '.join(shortages)}: all "
+        f"{cfg.all_worlds} worlds are stepped in one process instead, which is slower"
     )

@@ -28,10 +28,11 @@ from typing import Any
 
 from tensordict import TensorDictBase
 from torch import multiprocessing, nn
-from torchrl.collectors import Collector, MultiSyncCollector
+from torchrl.collectors import MultiSyncCollector
 from torchrl.weight_update import SharedMemWeightSyncScheme
 
 from veca_marl.algos.collection.answers import AnswerPipe, BatchQueue
+from veca_marl.algos.collection.groups import GroupCollector
 from veca_marl.private_parts import torchrl_is_tested
 from veca_marl.processes.children import block_interrupts, prepare_child
 from veca_marl.processes.supervision import CHECK_S, Limit, ProcessGroup, WorkerError
@@ -39,20 +40,20 @@ from veca_marl.processes.supervision import CHECK_S, Limit, ProcessGroup, Worker
 _MESSAGE_CHARS = 1000  # with a pickle's overhead below what a pipe writes at once (4096 bytes)
 
 
-class WorkerCollector(Collector):
+class WorkerCollector(GroupCollector):
     """The collector in a worker; it sends an exception's message before the worker ends.
 
     Args:
-        *args: As for `Collector`.
+        *args: As for `GroupCollector`.
         exceptions: A queue for the index of the worker and the message.
         worker_idx: Index of the worker.
-        **kwargs: As for `Collector`.
+        **kwargs: As for `GroupCollector`.
     """
 
     def __init__(self, *args: Any, exceptions: Any, worker_idx: int, **kwargs: Any) -> None:
         self._exceptions, self._index = exceptions, worker_idx
         with self._exceptions_sent():
-            super().__init__(*args, worker_idx=worker_idx, **kwargs)
+            super().__init__(*args, process=worker_idx, worker_idx=worker_idx, **kwargs)
 
     def iterator(self) -> Iterator[TensorDictBase]:
         """See the base class."""

@@ -13,17 +13,12 @@ from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torch import nn
 from torchrl.data import Composite
-from torchrl.envs import EnvBase, ExplorationType, TransformedEnv, set_exploration_type
+from torchrl.envs import EnvBase, ExplorationType, set_exploration_type
 from torchrl.envs.utils import RandomPolicy
 
 from veca_marl.algos.evaluation.episodes import EACH, SOLVED, EpisodeTally
 from veca_marl.algos.networks.memory import with_memory
-
-
-def derived_seed(seed: int, number: int) -> int:
-    """Return an independent 31-bit seed for each pair, of a stage or an episode for example."""
-    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0] >> 1)
-
+from veca_marl.algos.seeds import derived_seed, seed_worlds
 
 ActionPolicy = Callable[[TensorDictBase], TensorDictBase]
 
@@ -137,13 +132,7 @@ def evaluate(
 
 def seed_episodes(env: EnvBase, seed: int, first: int) -> None:
     """Let the next reset of world w begin episode `first` + w, and seed the samples."""
-    base = env
-    while isinstance(base, TransformedEnv):
-        base = base.base_env
-    numbered = hasattr(base, "first_world")
-    if numbered:
-        base.first_world = first
-    env.set_seed(seed if numbered else derived_seed(seed, first))
+    seed_worlds(env, seed, first)
     torch.manual_seed(derived_seed(seed, first))
 
 

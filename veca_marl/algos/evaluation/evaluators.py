@@ -13,7 +13,7 @@ import torch
 from torch import nn
 from torchrl.envs import EnvBase
 
-from veca_marl.algos.collection.experience import start_method
+from veca_marl.algos.collection.experience import start_method, threads
 from veca_marl.algos.evaluation.evaluate import (
     Exploration,
     RandomTeams,
@@ -90,16 +90,17 @@ class Evaluator(Protocol):
 
 
 class LocalEvaluator:
-    """Plays in worlds of this process.
+    """Plays in worlds of this process, with as many threads as processes that evaluate.
 
     Args:
         make_env: Makes the worlds.
         players: Makes the policies for an environment.
         worlds: Number of worlds.
+        parts: Number of equal parts of the episodes, which are played one after the other.
     """
 
-    def __init__(self, make_env: EnvFactory, players: Players, worlds: int) -> None:
-        self._env = make_env(worlds, 0)
+    def __init__(self, make_env: EnvFactory, players: Players, worlds: int, parts: int = 1) -> None:
+        self._env, self._parts = make_env(worlds, 0), parts
         self._players = players(self._env)
 
     def count_steps(self, count: Callable[[], None]) -> None:
@@ -110,6 +111,10 @@ class LocalEvaluator:
     def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
         meanwhile()
+        with threads(_THREADS):
+            return joined_scores([self._play(part) for part in _split(request, self._parts)])
+
+    def _play(self, request: Request) -> dict[str, Scores]:
         return evaluate(
             self._env,
             self._players[request.player],
@@ -138,7 +143,7 @@ def _serve_episodes(
 
 
 class ParallelEvaluator:
-    """Plays equal parts of the episodes in several processes.
+    """Plays equal parts of the episodes in several processes, which take one after the other.
 
     The parameters and buffers of the policies are in shared memory: a change in this process
     reaches the others.
@@ -147,7 +152,8 @@ class ParallelEvaluator:
         make_env: Makes the worlds.
         players: Makes the policies for an environment, in each process.
         processes: Number of processes.
-        worlds: Number of worlds of all processes, rounded up to equal numbers.
+        worlds: Number of worlds of each process.
+        parts: Number of parts.
         limit: Limit for the time that a process takes for its worlds, for a step of them, or for
             its answer after the last one.
 
@@ -156,17 +162,23 @@ class ParallelEvaluator:
     """
 
     def __init__(
-        self, make_env: EnvFactory, players: Players, processes: int, worlds: int, limit: Limit
+        self,
+        make_env: EnvFactory,
+        players: Players,
+        processes: int,
+        worlds: int,
+        parts: int,
+        limit: Limit,
     ) -> None:
         players.policy.share_memory()
-        self._processes = processes
-        serve = partial(_serve_episodes, make_env, players, math.ceil(worlds / processes))
+        self._parts = parts
+        serve = partial(_serve_episodes, make_env, players, worlds)
         method = start_method(_THREADS)
         self._pool = ProcessPool("evaluation process", serve, processes, limit, method)
 
     def play(self, request: Request, meanwhile: Callable[[], None] = nothing) -> dict[str, Scores]:
         """See `Evaluator`."""
-        parts = _split(request, self._processes)
+        parts = _split(request, self._parts)
         answers = self._pool.answers(parts)
         meanwhile()
         scores = dict(answers)
@@ -188,17 +200,28 @@ def _split(request: Request, parts: int) -> list[Request]:
 
 
 def make_evaluator(
-    make_env: EnvFactory, players: Players, processes: int, worlds: int, limit: Limit
+    make_env: EnvFactory,
+    players: Players,
+    parts: int,
+    processes: int,
+    worlds: int,
+    limit: Limit,
 ) -> Evaluator:
     """Return an evaluator with a number of processes; with none it plays in this process.
+
+    Scores depend on the number of parts, not on that of processes: one call of a policy acts for
+    the worlds of one part.
 
     Args:
         make_env: Makes the worlds.
         players: Makes the policies for an environment.
+        parts: Number of parts of the episodes that can be played at the same time.
         processes: Number of worker processes.
-        worlds: Number of worlds of all processes.
+        worlds: Number of worlds of all parts, rounded up to equal numbers.
         limit: See `ParallelEvaluator`; not used without worker processes.
     """
+    parts = min(parts, worlds)
+    each = math.ceil(worlds / parts)
     if processes == 0:
-        return LocalEvaluator(make_env, players, worlds)
-    return ParallelEvaluator(make_env, players, min(processes, worlds), worlds, limit)
+        return LocalEvaluator(make_env, players, each, parts)
+    return ParallelEvaluator(make_env, players, min(processes, parts), each, parts, limit)

@@ -26,7 +26,7 @@ from veca_marl.algos.checkpoints import Checkpoints, load_errors, to_plain
 from veca_marl.algos.collection.experience import CollectCfg, Experience, NoExperience
 from veca_marl.algos.evaluation.comparison import comparison_line, score_rows
 from veca_marl.algos.evaluation.episodes import TrainingEpisodes, stored_means
-from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores, derived_seed
+from veca_marl.algos.evaluation.evaluate import EvalCfg, Scores
 from veca_marl.algos.evaluation.evaluators import (
     Evaluator,
     Players,
@@ -36,6 +36,7 @@ from veca_marl.algos.evaluation.evaluators import (
 )
 from veca_marl.algos.policy import Policy
 from veca_marl.algos.reporting import Reporter
+from veca_marl.algos.seeds import derived_seed
 from veca_marl.algos.specs import EnvFactory, TeamSpec, action_key
 from veca_marl.algos.training.finite import (
     check_batch,
@@ -54,6 +55,7 @@ from veca_marl.algos.training.schedule import (
     device_memory,
     timing_table,
 )
+from veca_marl.processes.cores import usable_cores
 
 _EVALUATION_STAGE = 2**31 - 1  # in place of a stage number: seeds that no training stage uses
 
@@ -217,7 +219,8 @@ class Trainer:
         return make_evaluator(
             self.make_env,
             players,
-            self.collect.processes,
+            self.collect.groups,
+            self.collect.processes_on(usable_cores()),
             self.evaluation.worlds,
             self.collect.limit,
         )

@@ -278,9 +278,18 @@ class BodyDynamics:
         return result
 
     def _settle(self, step_s: float, weight: Floats, contact: int) -> int:
-        arrays = (self.solver, self.state, self._links, self.forces)
-        body = (self.tree, self._limits, self._ends)
-        result: int = settle(*body, step_s, weight, contact, *arrays)
+        result: int = settle(
+            self.tree,
+            self._limits,
+            self._ends,
+            step_s,
+            weight,
+            contact,
+            self.solver,
+            self.state,
+            self._links,
+            self.forces,
+        )
         return result
 
     # ---- what follows from the state
