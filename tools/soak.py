@@ -25,7 +25,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
+from typing import IO
 
 import numpy as np
 import torch
@@ -44,7 +45,7 @@ from veca_marl.processes.children import end_of
 
 _ROOT = Path(__file__).parents[1]
 _HELPERS = _ROOT / "tests" / "helpers"
-_STEPS = 70  # of each task in a round
+_STEPS = 300  # of each task in a round
 _OBSERVED_EVERY = 5
 _CONFIGURATION_S = 120
 _BESIDE = ("parsers", "configurations")
@@ -232,9 +233,19 @@ def _too_long(*_: object) -> None:
     raise TimeoutError(f"more than {_CONFIGURATION_S} s")
 
 
-def _start(*words: str) -> subprocess.Popen[str]:
+def _start(*words: str) -> tuple[subprocess.Popen[str], IO[str]]:
+    """Start a part of the soak; what it prints goes to a file, since a pipe that is full stops it."""
     command = [sys.executable, "-m", "tools.soak", *words]
-    return subprocess.Popen(command, cwd=_ROOT, stdout=subprocess.PIPE, text=True)
+    printed = TemporaryFile("w+")
+    return subprocess.Popen(command, cwd=_ROOT, stdout=printed, text=True), printed
+
+
+def _printed(process: subprocess.Popen[str], file: IO[str]) -> list[str]:
+    """Return the lines that a part has printed, when it has ended."""
+    process.wait()
+    file.seek(0)
+    with file:
+        return file.read().splitlines()
 
 
 def run(options: SoakOptions, overrides: list[str]) -> None:
@@ -262,13 +273,13 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
     beside = [_start(*words, f"part={part}") for part in _BESIDE]
     try:
         samples, problems = play_rounds(options.minutes, options.seed)
-        printed = [one.communicate()[0].splitlines() for one in beside]
+        printed = [_printed(*one) for one in beside]
     finally:
-        for one in beside:
-            one.kill()
+        for process, _ in beside:
+            process.kill()
     parsers = Parsers(0, "", [])
     configurations = Configurations()
-    for part, process, lines in zip(_BESIDE, beside, printed, strict=True):
+    for part, (process, _), lines in zip(_BESIDE, beside, printed, strict=True):
         if process.returncode:
             at = f" at: {lines[-1]}" if lines else ""
             problems.append(f"the process of the {part} {end_of(process.returncode)}{at}")

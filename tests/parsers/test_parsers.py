@@ -248,6 +248,12 @@ def test_fields_of_a_sofa_file(sofa, data):
     read(write(changed, stated, units))
 
 
+@pytest.mark.parametrize("key", ["SOFAConventions", "DataType"])
+def test_an_attribute_of_two_lines_is_refused_in_one(sofa, key):
+    write, fields, named = sofa
+    read(write(fields, named | {key: "0\n0"}))
+
+
 @many
 @given(data=st.data())
 def test_bytes_of_a_sofa_file(sofa, data):

@@ -137,7 +137,7 @@ def field_house(field):
     return field._surroundings
 
 
-@pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf])
+@pytest.mark.parametrize("wrong", [-1.0, 201.0, 1e308, np.nan, np.inf])
 def test_impossible_losses_are_refused(wrong):
     with pytest.raises(ValueError, match="transmission_loss_db"):
         house(loss_db=wrong)

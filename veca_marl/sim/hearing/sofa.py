@@ -395,11 +395,11 @@ def _data_type(file: SofaFile, name: str) -> str:
     convention = file.attribute("SOFAConventions") or "missing"
     if convention not in _CONVENTIONS:
         raise SofaError(
-            f"{name}: SOFAConventions is {convention}, must be one of {', '.join(_CONVENTIONS)}"
+            f"{name}: SOFAConventions is {convention!r}, must be one of {', '.join(_CONVENTIONS)}"
         )
     expected, stated = _CONVENTIONS[convention], file.attribute("DataType") or "missing"
     if stated != expected:
-        raise SofaError(f"{name}: DataType is {stated}, that of {convention} is {expected}")
+        raise SofaError(f"{name}: DataType is {stated!r}, that of {convention} is {expected}")
     missing = [field for field in _FIELDS[expected] if field not in file]
     if missing:
         raise SofaError(f"{name}: lacks {', '.join(missing)}")

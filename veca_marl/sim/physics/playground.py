@@ -19,7 +19,7 @@ from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
 from veca_marl.sim.sound.obstacles import Doorway
-from veca_marl.sim.sound.partitions import TRANSMISSION_LOSS_DB
+from veca_marl.sim.sound.partitions import MOST_LOSS_DB, TRANSMISSION_LOSS_DB
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall, at most so far from either room."""
@@ -54,7 +54,7 @@ class PlaygroundCfg:
         floor_checker_m: Edge of the floor's checker pattern.
         image_order: Greatest number of reflections of a sound, from 0 (the direct sound only) to
             `GREATEST_IMAGE_ORDER`.
-        transmission_loss_db: Loss of a sound at 500 Hz that passes through an obstacle.
+        transmission_loss_db: Loss of a sound at 500 Hz that passes through an obstacle, 0 to 200.
         impacts: Sounds of things that hit each other or the floor.
     """
 
@@ -160,10 +160,10 @@ class PlaygroundCfg:
                 f"(direct sound) to {GREATEST_IMAGE_ORDER}"
             )
         loss_db = self.transmission_loss_db
-        if not (math.isfinite(loss_db) and loss_db >= 0.0):
+        if not 0.0 <= loss_db <= MOST_LOSS_DB:
             raise ValueError(
-                f"playground {self.name!r}: transmission_loss_db={loss_db} must be finite, "
-                "0 or more"
+                f"playground {self.name!r}: transmission_loss_db={loss_db} must be from 0 to "
+                f"{MOST_LOSS_DB:g}"
             )
 
     def _check_names(self, kind: str, names: list[str]) -> None:

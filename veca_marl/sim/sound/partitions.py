@@ -24,6 +24,8 @@ TRANSMISSION_LOSS_DB = 30.0
 Measurements, SAE 2007-01-2201); 47 is one of those in use, 5 dB below normal incidence, which is
 20 log10(pi f m / (rho c)) with rho c = 415 kg/(m2 s)."""
 
+MOST_LOSS_DB = 200.0  # the squares of what passes are numbers of single precision in spectra
+
 _RATIO = BANDS_HZ / REFERENCE_HZ
 _RISE: Floats = _RATIO / np.sqrt(0.5 + 0.5 * _RATIO**2)
 """Impedance in each band relative to 500 Hz, in proportion to frequency below, by mass, and nearly

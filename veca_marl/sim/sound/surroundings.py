@@ -21,7 +21,12 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.sound.attenuated_paths import Reflector, energies_between, energies_inside
 from veca_marl.sim.sound.obstacles import Doorway, Obstacles, ScreenSets
-from veca_marl.sim.sound.partitions import N_BANDS, TRANSMISSION_LOSS_DB, surface_ratio
+from veca_marl.sim.sound.partitions import (
+    MOST_LOSS_DB,
+    N_BANDS,
+    TRANSMISSION_LOSS_DB,
+    surface_ratio,
+)
 from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
 
 _BETWEEN_ROOMS = -1  # `paths_id` of paths between rooms is this and below; rooms have 0 and up
@@ -222,12 +227,14 @@ class House:
             doorways: Openings in the walls between rooms, where these do not reflect.
 
         Raises:
-            ValueError: If there is no room or the loss is negative or not finite.
+            ValueError: If there is no room, or the loss is not from 0 to `MOST_LOSS_DB`.
         """
         if not rooms:
             raise ValueError("a house needs at least one room")
-        if not (np.isfinite(transmission_loss_db) and transmission_loss_db >= 0.0):
-            raise ValueError(f"transmission_loss_db={transmission_loss_db} must be finite, 0 or up")
+        if not 0.0 <= transmission_loss_db <= MOST_LOSS_DB:
+            raise ValueError(
+                f"transmission_loss_db={transmission_loss_db} must be from 0 to {MOST_LOSS_DB:g}"
+            )
         self.obstacles = Obstacles()
         self._rooms = [OneRoom(room, image_order) for room in rooms]
         self._lattice, self._doorways = image_lattice(image_order), list(doorways)
