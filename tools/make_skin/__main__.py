@@ -1,10 +1,12 @@
 """Make the mesh of the skin: ``python -m tools.make_skin`` writes ``veca_marl/data/skin_*.csv``.
 
 It is to be made anew after a change of the bones' primitives in ``veca_marl/data/bones.csv``.
+``--measure`` writes nothing and prints how far the stored mesh is from the felt skin.
 """
 
 from __future__ import annotations
 
+import argparse
 import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,6 +15,7 @@ import numpy as np
 
 from tools.make_skin.fit import fit
 from tools.make_skin.loft import Loft, lofted
+from tools.make_skin.measure import measured
 from veca_marl.sim.body.anatomy import Skeleton, load_skeleton
 
 FOLDER = Path(__file__).resolve().parents[2] / "veca_marl" / "data"
@@ -20,7 +23,12 @@ _DECIMALS = 6  # micrometres
 
 
 def main() -> None:
-    """Loft, fit and write."""
+    """Loft, fit and write, or measure."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--measure", action="store_true", help="measure the stored mesh")
+    if parser.parse_args().measure:
+        print("\n".join(measured()))
+        return
     skeleton = load_skeleton()
     loft = lofted(skeleton)
     worst_m = fit(loft, skeleton)

@@ -40,11 +40,16 @@ def limb_of(bone: str) -> str:
 
 
 class FeltSkin:
-    """Distances to the felt skin of the limbs in the binding pose."""
+    """Distances to the felt skin of the limbs.
 
-    def __init__(self, skeleton: Skeleton) -> None:
-        self._skeleton = skeleton
-        self._positions, self._rotations = binding_pose(skeleton)
+    Args:
+        skeleton: The bones.
+        positions: ``(47, 3)`` metres, where they are.
+        rotations: ``(47, 3, 3)``.
+    """
+
+    def __init__(self, skeleton: Skeleton, positions: Floats, rotations: Floats) -> None:
+        self._skeleton, self._positions, self._rotations = skeleton, positions, rotations
         names = [limb_of(bone.name) for bone in skeleton.bones]
         self._limbs = [[i for i, name in enumerate(names) if name == limb] for limb in set(names)]
 
@@ -94,7 +99,7 @@ class Problem:
     """The linear maps of the fit.
 
     Attributes:
-        free: ``(3 V, q)`` the coordinates of all vertices of trunk and left side, from the free ones.
+        free: ``(3 V, q)`` the coordinates of the vertices of trunk and left side, from free ones.
         start: ``(3 V,)`` metres, the coordinates of the loft in the binding pose.
         taxels: ``(3 T, 3 V)`` the coordinates of the taxels from those of the vertices.
         bones: ``(T,)`` bone of each taxel.
@@ -114,7 +119,7 @@ def fit(loft: Loft, skeleton: Skeleton) -> float:
     Returns:
         Metres, the largest distance of a taxel that is not hidden from the felt skin.
     """
-    problem, felt = _problem(loft, skeleton), FeltSkin(skeleton)
+    problem, felt = _problem(loft, skeleton), FeltSkin(skeleton, *binding_pose(skeleton))
     now = problem.start.copy()
     weights = np.ones(len(problem.bones))
     best, least = now, np.inf
