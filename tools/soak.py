@@ -22,6 +22,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
@@ -233,19 +234,15 @@ def _too_long(*_: object) -> None:
     raise TimeoutError(f"more than {_CONFIGURATION_S} s")
 
 
-def _start(*words: str) -> tuple[subprocess.Popen[str], IO[str]]:
-    """Start a part of the soak; what it prints goes to a file, since a pipe that is full stops it."""
+def _start(printed: IO[str], *words: str) -> subprocess.Popen[str]:
+    """Start a part of the soak; it prints into a file, since a pipe that is full would stop it."""
     command = [sys.executable, "-m", "tools.soak", *words]
-    printed = TemporaryFile("w+")
-    return subprocess.Popen(command, cwd=_ROOT, stdout=printed, text=True), printed
+    return subprocess.Popen(command, cwd=_ROOT, stdout=printed, text=True)
 
 
-def _printed(process: subprocess.Popen[str], file: IO[str]) -> list[str]:
-    """Return the lines that a part has printed, when it has ended."""
-    process.wait()
+def _lines(file: IO[str]) -> list[str]:
     file.seek(0)
-    with file:
-        return file.read().splitlines()
+    return file.read().splitlines()
 
 
 def run(options: SoakOptions, overrides: list[str]) -> None:
@@ -270,16 +267,21 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
     file = check_file(options.to, "to")
     line = machine_line()
     words = [f"minutes={options.minutes}", f"seed={options.seed}"]
-    beside = [_start(*words, f"part={part}") for part in _BESIDE]
-    try:
-        samples, problems = play_rounds(options.minutes, options.seed)
-        printed = [_printed(*one) for one in beside]
-    finally:
-        for process, _ in beside:
-            process.kill()
+    with ExitStack() as files:
+        outputs = [files.enter_context(TemporaryFile("w+")) for _ in _BESIDE]
+        parts = [f"part={part}" for part in _BESIDE]
+        beside = [_start(to, *words, part) for to, part in zip(outputs, parts, strict=True)]
+        try:
+            samples, problems = play_rounds(options.minutes, options.seed)
+            for process in beside:
+                process.wait()
+        finally:
+            for process in beside:
+                process.kill()
+        printed = [_lines(file) for file in outputs]
     parsers = Parsers(0, "", [])
     configurations = Configurations()
-    for part, (process, _), lines in zip(_BESIDE, beside, printed, strict=True):
+    for part, process, lines in zip(_BESIDE, beside, printed, strict=True):
         if process.returncode:
             at = f" at: {lines[-1]}" if lines else ""
             problems.append(f"the process of the {part} {end_of(process.returncode)}{at}")

@@ -9,9 +9,10 @@ from veca_marl.sim.body.humanoid.joint_control import JointActionKind
 from veca_marl.sim.body.humanoid.postures import POSTURES
 
 SETTLING_S, MEASURED_S = 3.0, 1.0
+LIMP_S = 6.0  # a head that stands on its forehead falls to a side after up to 4 s
 
 
-def fastest_joint_radps(detail, action, posture):
+def fastest_joint_radps(detail, action, posture, settling_s=SETTLING_S):
     """Return the largest root mean square of a joint's speed after a body has settled."""
     world = empty_world()
     body = Humanoid("child", HumanoidCfg(detail=detail, action=action), world)
@@ -19,9 +20,9 @@ def fastest_joint_radps(detail, action, posture):
     if action is JointActionKind.position:
         body.act(body.encode(body.posture_angles(POSTURES[posture])))
     speeds = []
-    for step in range(round((SETTLING_S + MEASURED_S) * 25)):
+    for step in range(round((settling_s + MEASURED_S) * 25)):
         world.step()
-        if step >= round(SETTLING_S * 25):
+        if step >= round(settling_s * 25):
             speeds.append(body.joint_velocities())
     world.close()
     return float(np.sqrt(np.square(speeds).mean(0)).max())
@@ -42,7 +43,7 @@ def test_a_posture_that_is_held_is_at_rest(detail, posture, bound):
 
 @pytest.mark.parametrize("posture", ["on_back", "on_belly"])
 def test_a_limp_body_on_the_floor_comes_to_rest(posture):
-    assert fastest_joint_radps(Detail.mitten, JointActionKind.torque, posture) < 0.2
+    assert fastest_joint_radps(Detail.mitten, JointActionKind.torque, posture, LIMP_S) < 0.2
 
 
 def test_a_full_body_holds_itself_on_all_fours():

@@ -66,7 +66,7 @@ def test_mean_and_maximum_are_those_of_the_taxels_of_a_part():
         ("l_hand", (0.0, 0.025, -0.03), "l_hand_back"),
         ("r_thigh", (0.055, 0.0, -0.08), "r_thigh_front"),
         ("l_foot", (0.062, 0.0, -0.06), "l_sole_front"),
-        ("l_foot", (-0.01, 0.0, -0.055), "l_heel"),
+        ("l_foot", (-0.01, 0.0, -0.058), "l_heel"),
         ("head", (0.1, 0.0, 0.066), "head_front"),
         ("head", (0.01, 0.08, 0.066), "head_left"),
         ("l_index_distal", (0.012, 0.0, -0.02), "l_index_tip"),

@@ -2,8 +2,8 @@
 
 The sensing point of a taxel is where the line through the taxel, along the normal of its triangle,
 meets the physical skin: the surface at the distance d_max, the thickness of the skin, from the
-rigid bone. The rendered mesh differs from that surface by some millimetres; without the shift,
-light contact on a hollow of the mesh would read 0, and contact on a bulge too much.
+rigid bone. The rendered mesh differs from that surface by up to 2 mm where it is bound; without the
+shift, light contact on a hollow of the mesh would read 0, and contact on a bulge too much.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from refusals import naming
+from skins import heights_above_the_felt_skin
 
 from veca_marl.sim.body.anatomy import (
     REFERENCE,
@@ -196,6 +197,13 @@ def test_the_taxels_have_the_same_order_and_lie_on_the_skin(growth):
     off = np.abs(np.concatenate(off))
     assert np.median(off) < 1e-5
     assert np.mean(off < 1e-4) > 0.55
+
+
+def test_the_drawn_skin_follows_the_felt_skin(growth):
+    """Length and girth grow by different factors: vertices keep their places, caps their forms."""
+    _, heights = heights_above_the_felt_skin(growth)
+    assert np.mean(np.abs(heights) < 0.002) > 0.96
+    assert np.abs(heights).max() < 0.007
 
 
 def test_no_face_of_the_skin_looks_inward(growth):

@@ -1,4 +1,4 @@
-"""The skin as a mesh: counts, closedness, orientation, symmetry."""
+"""The skin as a mesh: counts, closedness, orientation, symmetry, felt skin."""
 
 import csv
 from collections import Counter
@@ -6,7 +6,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from skins import add_body
+from skins import add_body, heights_above_the_felt_skin
 
 from veca_marl.sim.body.anatomy import binding_pose, load_skeleton, load_skin
 from veca_marl.sim.geometry import Scene
@@ -92,6 +92,15 @@ def test_no_face_looks_inward():
         step = 1e-5
         rise = distance_to_bone(bone, at + step * out) - distance_to_bone(bone, at - step * out)
         assert (rise / (2 * step) > -0.2).all(), bone.name
+
+
+def test_the_drawn_skin_and_the_felt_skin_agree_within_2_mm():
+    owners, heights = heights_above_the_felt_skin()
+    bones = load_skeleton().bones
+    for index, bone in enumerate(bones):
+        own = owners == index
+        assert own.sum() >= 60, bone.name  # taxels that are not inside another limb
+        assert np.abs(heights[own]).max() < 0.002, bone.name
 
 
 def test_the_body_is_as_large_as_the_table_says():

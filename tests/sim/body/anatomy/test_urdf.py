@@ -45,9 +45,9 @@ def names(robot, tag, kind=None):
     return [e.get("name") for e in robot.iter(tag) if kind in (None, e.get("type"))]
 
 
-def test_47_bones_36_light_links_4_skins_6_second_shapes_and_82_hinges(robots):
+def test_47_bones_36_light_links_4_skins_13_further_shapes_and_82_hinges(robots):
     links = names(robots[True], "link")
-    assert len(links) == len(set(links)) == 47 + 36 + 4 + 6
+    assert len(links) == len(set(links)) == 47 + 36 + 4 + 13
     bones = {bone.name for bone in SKELETON.bones}
     assert {bone_of(link) for link in links} & bones == bones
     assert set(links) >= {bone.name for bone in SKELETON.bones}
@@ -65,9 +65,9 @@ def test_with_fingers_no_link_has_two_shapes_and_most_are_taken_as_they_are(robo
         for shape in shapes:
             alone += shape.find("origin").attrib == link.find("inertial/origin").attrib
     assert alone >= 45
-    # two capsules in the trunk twice and the toes twice, with their skins
+    # pelvis, spine, chest, shanks, and the toes with their skins
     parts = [name for name in names(robots[True], "link") if "__part" in name]
-    assert len(parts) == 6
+    assert len(parts) == 2 + 2 + 3 + 2 + 4
 
 
 def test_the_mitten_has_40_hinges_and_no_finger(robots):
@@ -190,11 +190,12 @@ def test_hulls_of_a_mitten_reach_as_far_as_what_is_in_them():
     files = body_files(SKELETON, Build(fingers=False))
     assert {name.removesuffix(".obj") for name in files.hulls} == {
         "pelvis",
+        "spine",
         "chest",
         *(
             f"{side}_{part}"
             for side in "lr"
-            for part in ("foot", "foot__skin", "hand__skin", "hand__thumb")
+            for part in ("shank", "foot", "foot__skin", "hand__skin", "hand__thumb")
         ),
     }
     ways = np.random.default_rng(0).normal(size=(500, 3))
