@@ -16,7 +16,7 @@ def test_an_arm_without_its_overrides_is_refused():
 
 
 def test_an_arm_with_its_overrides_is_composed():
-    own = ["senses/audio=mono", "total_frames=245_760"]
+    own = ["senses/audio=mono", "total_frames=409_600"]
     assert compose([*ARM, *own]).experiment.arm == "mono"
 
 

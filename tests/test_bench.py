@@ -211,7 +211,9 @@ def test_the_measured_skin_senses_each_prop_and_nothing_else(things, distant):
     vertices = world.scene.meshes.vertices
     middles = vertices[world.scene.meshes.triangles].mean(axis=1)
     balls = np.array([world.prop(f"ball_{i}").position for i in range(things)]).reshape(-1, 3)
-    near = np.linalg.norm(middles[:, None] - balls[None], axis=-1) < 0.06
+    corners = vertices[world.scene.meshes.triangles] - middles[:, None]
+    reach = 0.035 + np.linalg.norm(corners, axis=-1).max(axis=1)  # radius of a ball, and a margin
+    near = np.linalg.norm(middles[:, None] - balls[None], axis=-1) < reach[:, None]
     assert (felt[:, None] & near).any(axis=0).all()
     assert not (felt & ~near.any(axis=1)).any()
     world.close()

@@ -251,7 +251,7 @@ steps; with fewer steps for each, parameters are sent more often.
 def page(measured: Measured, cores: Sequence[int]) -> str:
     """Return the text of the page."""
     collect = measured.cfg.collect
-    frames_each = collect.worlds * collect.steps
+    frames_each = _GROUPS * collect.worlds * collect.steps
     traffic = measured.frame_bytes + measured.policy_bytes / frames_each
     total = math.fsum(measured.parts_ms.values())
     return _PAGE.format(

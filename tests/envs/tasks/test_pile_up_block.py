@@ -193,7 +193,10 @@ def gripping(palms, block):
 
 
 def test_a_block_on_one_that_is_held_up_has_a_lower_return_than_a_pile(game, piling):
-    """A constraint keeps the lower block level, in the place of a strong grip."""
+    """A constraint keeps the lower block level, in the place of a strong grip.
+
+    The upper one is put back on it again and again: hands that close push it off.
+    """
     game.reset(np.random.default_rng(0))
     child, (block, other), base = game.task.child, game.task.red, game.task.blue
     other.place(AWAY)
@@ -203,8 +206,7 @@ def test_a_block_on_one_that_is_held_up_has_a_lower_return_than_a_pile(game, pil
         for terms in play_commands(
             game, gripping(PalmMotion(child, game.world.clock.step_s), base)
         ):
-            if game.steps == 100:
-                assert child.touches(base)
+            if game.steps >= 100 and game.steps % 10 == 0:
                 block.place((0.27, 0.0, 0.2 + EDGE + 0.001))
             gained += game.reward_of(terms)
             lying += rests_on(block, base) and is_released(block, child) and child.touches(base)
