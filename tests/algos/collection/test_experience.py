@@ -5,6 +5,7 @@ import pytest
 import torch
 from fake_env import make_fake_env
 from refusals import naming
+from torchrl.envs.utils import RandomPolicy
 
 from veca_marl.algos.collection.experience import CollectCfg, Experience
 
@@ -87,6 +88,20 @@ def test_processes_change_no_byte_of_what_is_collected(make_ppo):
             assert torch.equal(batch[key], batches[0][key]), key
     actions = batches[0]["agents", "action"]
     assert len({tuple(row.flatten().tolist()) for row in actions}) == 8, "two worlds act alike"
+
+
+def test_a_policy_without_keys_acts_for_groups():
+    batches = []
+    for processes in (0, 2):
+        policy = RandomPolicy(make_fake_env(2, 0).action_spec)
+        cfg = CollectCfg(4, worlds=2, steps=8, processes=processes)
+        experience = Experience(make_fake_env, policy, cfg)
+        experience.restart(5)
+        batches.append(experience.collect().clone())
+        experience.close()
+    actions = [batch["agents", "action"] for batch in batches]
+    assert torch.equal(*actions)
+    assert len(actions[0].flatten().unique()) > 8, "actions of earlier steps are repeated"
 
 
 def test_random_numbers_of_this_process_are_those_without_collection(make_ppo):

@@ -35,7 +35,9 @@ class GroupedPolicy(TensorDictModuleBase):
     def __init__(self, policy: TensorDictModuleBase, groups: int) -> None:
         super().__init__()
         self.policy, self.groups = policy, groups
-        self.in_keys, self.out_keys = policy.in_keys, policy.out_keys
+        # policies without keys, such as TorchRL's `RandomPolicy`, write new tensors
+        self.in_keys = getattr(policy, "in_keys", [])
+        self.out_keys = getattr(policy, "out_keys", [])
         self._states: list[Tensor] = [torch.get_rng_state()] * groups
 
     def seed(self, seed: int, first_group: int) -> None:
@@ -53,11 +55,17 @@ class GroupedPolicy(TensorDictModuleBase):
                 return self._act(0, tensordict)
             # copies, because libraries may compute otherwise where memory is aligned otherwise
             parts = [part.clone() for part in tensordict.chunk(self.groups, 0)]
-            read = set(tensordict.keys(True, True)) - set(self.out_keys)
-            acted = [self._act(group, part).exclude(*read) for group, part in enumerate(parts)]
-            return tensordict.update(torch.cat(acted, 0))
+            written = [self._written(group, part) for group, part in enumerate(parts)]
+            return tensordict.update(torch.cat(written, 0))
         finally:
             torch.set_rng_state(before)
+
+    def _written(self, group: int, tensordict: TensorDictBase) -> TensorDictBase:
+        """Return what the policy writes for a group: its keys, and what else is new."""
+        before = dict(tensordict.items(True, True))
+        acted, own = self._act(group, tensordict), set(self.out_keys)
+        read = [k for k, v in acted.items(True, True) if k not in own and v is before.get(k)]
+        return acted.exclude(*read)
 
     def _act(self, group: int, tensordict: TensorDictBase) -> TensorDictBase:
         torch.set_rng_state(self._states[group])
