@@ -1,6 +1,6 @@
 """Make the mesh of the skin: ``python -m tools.make_skin`` writes ``veca_marl/data/skin_*.csv``.
 
-It is to be made anew after a change of the bones' primitives in ``veca_marl/data/bones.csv``.
+Run it after a change of the bones' primitives in ``veca_marl/data/bones.csv``.
 ``--measure`` writes nothing and prints how far the stored mesh is from the felt skin.
 """
 

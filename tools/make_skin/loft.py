@@ -143,7 +143,7 @@ class Loft:
         self.triangle_bones += [self._skeleton.bone(bone)] * len(triangles)
 
     def mirror(self, first_triangle: int) -> None:
-        """Append the mirror image of the left side, whose first triangle this is."""
+        """Append the mirror image of the left side, which begins with this triangle."""
         self.first_right = len(self.points)
         bones = enumerate(self._skeleton.bones)
         right = {
@@ -174,7 +174,7 @@ def lofted(skeleton: Skeleton) -> Loft:
 
 
 def _circle(count: int, phase: float) -> Floats:
-    """Points ``(count, 2)`` of a polygon round the unit circle, whose edges touch it."""
+    """Vertices ``(count, 2)`` of the regular polygon that circumscribes the unit circle."""
     angles = (np.arange(count) + phase) * 2.0 * math.pi / count
     points: Floats = np.stack([np.cos(angles), np.sin(angles)], 1) / math.cos(math.pi / count)
     return points

@@ -12,7 +12,7 @@ def derived_seed(seed: int, number: int) -> int:
 
 
 def seed_worlds(env: EnvBase, seed: int, first_world: int) -> None:
-    """Seed an environment whose worlds are some of those of a run.
+    """Seed an environment that has a range of the numbered worlds of a run.
 
     Args:
         env: The environment. World w of one that has a `first_world`, as `VecaEnv`, then depends on
