@@ -158,7 +158,8 @@ def _call_before(number: signal.Signals, call: Callable[[], None]) -> Callable[[
 
     def restore() -> None:
         # a handler that was installed later calls this one
-        if signal.getsignal(number) is handle:
+        here = threading.current_thread() is threading.main_thread()
+        if here and signal.getsignal(number) is handle:
             signal.signal(number, previous)
 
     signal.signal(number, handle)
