@@ -162,8 +162,8 @@ class ProcessLauncher(Launcher):
                 raise SweepError(f"{job.name} has no score for the sweeper: {error}") from error
         return done
 
-    def _fit(self, jobs: Sequence[Job]) -> int:
-        """Return how many of the jobs fit on the machine together."""
+    def _fit(self, jobs: Sequence[Job], cores: int) -> int:
+        """Return how many of the jobs fit on the machine together, each with some cores."""
         # here, and not above: they import torch, which `train` has loaded
         from veca_marl.config import to_config
         from veca_marl.runs.assembly import runs_at_once
@@ -172,7 +172,7 @@ class ProcessLauncher(Launcher):
         for job in jobs:
             with _naming(job.name):
                 configs[job.name] = to_config(self._nodes[job.folder])
-        return runs_at_once(configs)
+        return runs_at_once(configs, cores)
 
     def _job(self, overrides: list[str], number: int) -> Job:
         # here, and not above: it imports the simulator, which `train` has loaded

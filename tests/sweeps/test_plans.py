@@ -140,11 +140,12 @@ def test_what_a_run_has_decided_itself_does_not_differ():
 
 
 def test_runs_at_a_time_fill_the_cores():
-    small = {**CONFIG, "collect": {"groups": 2, "processes": 0, "threads": 1}, "threads": 1}
-    assert (cores_of(CONFIG), cores_of(small), cores_of({**small, "threads": 4})) == (2, 1, 4)
-    assert default_jobs([CONFIG] * 9, 16) == 8
-    assert default_jobs([small] * 9, 16) == 9
-    assert default_jobs([CONFIG, small], 1) == 1
+    two = {**CONFIG, "collect": {"groups": 2, "processes": 2, "threads": 1}, "threads": 1}
+    assert (cores_of(CONFIG), cores_of(two), cores_of({**two, "threads": 4})) == (1, 2, 4)
+    assert default_jobs([CONFIG] * 9, 16) == 9
+    assert default_jobs([CONFIG] * 9, 4) == 4
+    assert default_jobs([two] * 9, 16) == 8
+    assert default_jobs([CONFIG, two], 1) == 1
 
 
 @pytest.mark.parametrize("team", [None, "red"])

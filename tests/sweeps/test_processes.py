@@ -22,7 +22,9 @@ def make(folder, name, code="pass", action=Action.start):
 
 def run(plans, at_once=2):
     out = io.StringIO()
-    return run_all(plans, at_once, 1, Progress(100 * len(plans), len(plans), out)), out.getvalue()
+    share = {"OMP_NUM_THREADS": "1"}
+    progress = Progress(100 * len(plans), len(plans), out)
+    return run_all(plans, at_once, share, progress), out.getvalue()
 
 
 def test_a_process_that_fails_does_not_stop_the_others(tmp_path):
@@ -84,7 +86,7 @@ folder = pathlib.Path(sys.argv[1])
 code = f"import os, time; open('{folder}/' + str(os.getpid()), 'w'); time.sleep(60)"
 jobs = [Job(n, folder / n, [], {"total_frames": 1}) for n in ("a", "b", "c")]
 signal.signal(signal.SIGINT, signal.default_int_handler)
-run_all([Plan(job, Action.start, ("-S", "-c", code)) for job in jobs], 2, 1, Progress(3, 3))
+run_all([Plan(job, Action.start, ("-S", "-c", code)) for job in jobs], 2, {}, Progress(3, 3))
 """
 
 
@@ -109,11 +111,15 @@ def pids(folder):
     return [int(path.name) for path in folder.iterdir() if path.name.isdigit()]
 
 
+def all_fit(jobs, cores):
+    return len(jobs)
+
+
 def test_failed_runs_are_named_with_their_logs(tmp_path, monkeypatch, capsys):
     plans = [make(tmp_path, "a", "raise SystemExit(3)"), make(tmp_path, "b")]
     monkeypatch.setattr(sweep, "plan", lambda job: plans[job.name == "b"])
     with pytest.raises(SweepError, match=naming("1 of 2", f"a ({tmp_path / 'a'}.log)")):
-        run_sweep([plan.job for plan in plans], 2, 1, len)
+        run_sweep([plan.job for plan in plans], 2, 1, all_fit)
     assert (
         "2 runs: 0 skipped (they have ended), 0 to continue, 2 to start" in capsys.readouterr().err
     )
@@ -121,7 +127,7 @@ def test_failed_runs_are_named_with_their_logs(tmp_path, monkeypatch, capsys):
 
 def test_two_jobs_with_one_folder_are_refused(tmp_path):
     with pytest.raises(SweepError, match=naming("2 ", tmp_path / "a", "hydra.sweep.subdir")):
-        run_sweep([make(tmp_path, "a").job] * 2, 2, 1, len)
+        run_sweep([make(tmp_path, "a").job] * 2, 2, 1, all_fit)
 
 
 def test_the_line_of_progress_has_frames_and_the_time_left(tmp_path):

@@ -86,7 +86,7 @@ def sac_sweep(tmp_path, monkeypatch):
         small += ["collect.groups=1", "collect.threads=1"]
         monkeypatch.setattr(sys, "argv", ["train", "-m", *SAC_SWEEP, *small, *words])
         TRAIN.main()
-        return tuple(seen[:2])
+        return seen[0], int(seen[1]["OMP_NUM_THREADS"])
 
     return call
 
@@ -145,7 +145,7 @@ def test_several_experiments_in_one_command_are_refused(sweep, capsys):
         (["experiment.seeds=[]"], "error: experiment audio_ablation has no seeds: give"),
         (
             ["total_frames=1e4"],
-            ("error: ", "=10000", "total_frames=245_760", "experiment.arms.stereo=[...]"),
+            ("error: ", "=10000", "total_frames=409_600", "experiment.arms.stereo=[...]"),
         ),
         (
             ["experiment.arms.mono=['senses/audio=none']"],

@@ -396,13 +396,14 @@ _LEARNER_BYTES = 750_000_000
 _OTHER_BYTES = 350_000_000
 
 
-def runs_at_once(configs: Mapping[str, Config]) -> int:
+def runs_at_once(configs: Mapping[str, Config], cores: int) -> int:
     """Return the number of runs that fit together, whichever of them they are; at least 1.
 
     One world is built and closed for each game with other teams, senses or bodies.
 
     Args:
         configs: Name of each run to its configuration.
+        cores: Cores of each run.
 
     Raises:
         ConfigError: If a run does not fit alone, with its name and what to change.
@@ -417,7 +418,7 @@ def runs_at_once(configs: Mapping[str, Config]) -> int:
             check_storage(known[key])
         except ValueError as error:
             raise ConfigError(f"{name}: {one_line(error)}") from error
-        needs.append({**known[key], "": StorageNeeded(_process_bytes(cfg))})
+        needs.append({**known[key], "": StorageNeeded(_process_bytes(cfg, cores))})
     return max(1, runs_that_fit(needs))
 
 
@@ -436,6 +437,6 @@ def storage_of(cfg: Config) -> dict[str, StorageNeeded]:
     }
 
 
-def _process_bytes(cfg: Config) -> int:
+def _process_bytes(cfg: Config, cores: int) -> int:
     """Return the memory of the learner, of processes that collect, and of as many that evaluate."""
-    return _LEARNER_BYTES + 2 * cfg.collect.processes_on(usable_cores()) * _OTHER_BYTES
+    return _LEARNER_BYTES + 2 * cfg.collect.processes_on(cores) * _OTHER_BYTES

@@ -142,7 +142,9 @@ class Running:
         return (time.monotonic() - self.started) / 60.0
 
 
-def run_all(plans: Sequence[Plan], at_once: int, threads: int, progress: Progress) -> list[Plan]:
+def run_all(
+    plans: Sequence[Plan], at_once: int, share: Mapping[str, str], progress: Progress
+) -> list[Plan]:
     """Run the processes of all plans and return those that failed.
 
     A process that fails does not stop the others. If this one is interrupted, the running ones are
@@ -152,7 +154,8 @@ def run_all(plans: Sequence[Plan], at_once: int, threads: int, progress: Progres
     Args:
         plans: What is to be done.
         at_once: Number of processes at a time.
-        threads: Torch threads of runs that have no number of their own.
+        share: Environment variables that say what of the machine a run may use, unless they are
+            set.
         progress: The display.
 
     Raises:
@@ -164,7 +167,7 @@ def run_all(plans: Sequence[Plan], at_once: int, threads: int, progress: Progres
     try:
         while waiting or running:
             while waiting and len(running) < at_once:
-                _start(waiting.popleft(), threads, running, failed, progress)
+                _start(waiting.popleft(), share, running, failed, progress)
             time.sleep(_POLL_S)
             for one in [one for one in running if one.process.poll() is not None]:
                 running.remove(one)
@@ -176,11 +179,14 @@ def run_all(plans: Sequence[Plan], at_once: int, threads: int, progress: Progres
 
 
 def _start(
-    plan: Plan, threads: int, running: list[Running], failed: list[Plan], progress: Progress
+    plan: Plan,
+    share: Mapping[str, str],
+    running: list[Running],
+    failed: list[Plan],
+    progress: Progress,
 ) -> None:
     job = plan.job
     job.log.parent.mkdir(parents=True, exist_ok=True)
-    share = {"OMP_NUM_THREADS": str(threads), CORES: str(threads)}
     environment = {**share, **os.environ, PARENT: str(os.getpid())}
     with job.log.open("ab") as log:
         try:
@@ -256,14 +262,14 @@ def _interrupt(running: Sequence[Running], progress: Progress) -> None:
 
 
 def cores_of(config: Mapping[str, Any]) -> int:
-    """Return the number of cores that a run can use at once.
+    """Return the number of cores that a run has to itself, at least.
 
-    Its worker processes and its learner take turns, so it is the larger of both; a learner without
-    a number of threads uses what is left.
+    Its worker processes and its learner take turns, so it is the larger of both. What a run without
+    numbers of its own does is the same on one core, which it uses all the time; on several, its
+    learner and its worker processes wait for each other.
     """
     collect = config["collect"]
-    processes = collect["groups"] if collect["processes"] is None else collect["processes"]
-    return int(max(1, processes * collect["threads"], config["threads"] or 1))
+    return int(max(1, (collect["processes"] or 0) * collect["threads"], config["threads"] or 1))
 
 
 def default_jobs(configs: list[Mapping[str, Any]], cores: int) -> int:
@@ -271,8 +277,10 @@ def default_jobs(configs: list[Mapping[str, Any]], cores: int) -> int:
     return max(1, min(len(configs), cores // max(map(cores_of, configs), default=1)))
 
 
-Fit = Callable[[Sequence[Job]], int]
+Fit = Callable[[Sequence[Job], int], int]
 """Returns how many of some jobs fit into the memory of the machine, whichever of them they are.
+
+The number is that of the cores of each job, on which the number of its processes depends.
 
 It raises `ValueError` if one does not fit alone.
 """
@@ -286,7 +294,7 @@ def run_sweep(jobs: Sequence[Job], most: int | None, cores: int, fit: Fit) -> No
     Args:
         jobs: The runs.
         most: Largest number of runs at a time; None is as many as the cores can run at once.
-        cores: Number of cores, which runs share that have no number of threads of their own.
+        cores: Number of cores, which the runs at a time share.
         fit: Limits the number of runs at a time further.
 
     Raises:
@@ -302,9 +310,13 @@ def run_sweep(jobs: Sequence[Job], most: int | None, cores: int, fit: Fit) -> No
     progress = Progress(sum(job.frames for job in jobs), len(jobs))
     left = [one.job for one in plans if one.action is not Action.skip]
     asked = most or default_jobs([job.asked for job in left], cores)
-    at_once = min(asked, fit(left)) if left else asked
+    # processes as many as fit; threads, which need no memory, on all cores
+    cores_each = max(1, cores // asked)
+    at_once = min(asked, fit(left, cores_each)) if left else asked
+    threads = max(1, cores // at_once)
     progress.event(_announcement(plans, at_once, asked))
-    failed = run_all(plans, at_once, max(1, cores // at_once), progress)
+    share = {"OMP_NUM_THREADS": str(threads), CORES: str(cores_each)}
+    failed = run_all(plans, at_once, share, progress)
     if failed:
         logs = ", ".join(f"{one.job.name} ({one.job.log})" for one in failed)
         raise SweepError(f"{len(failed)} of {len(jobs)} runs failed: {logs}")
