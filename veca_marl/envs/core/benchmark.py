@@ -88,7 +88,7 @@ def differences(found: Start, stored: Start) -> list[str]:
     missing = [f"{name} is missing" for name in stored if name not in found]
     added = [f"{name} is new" for name in found if name not in stored]
     changed = [
-        f"{name} is {_words(value)} (not {_words(stored[name])})"
+        f"{name} {_change(value, stored[name])}"
         for name, value in found.items()
         if name in stored and not _equal(name, value, stored[name])
     ]
@@ -133,13 +133,25 @@ def _equal(name: str, one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return any(np.allclose(one, np.multiply(sign, other), 0.0, _TOLERANCE) for sign in signs)
 
 
+def _change(value: tuple[float, ...], stored: tuple[float, ...]) -> str:
+    """Return the change of a value in words; of many numbers, how many differ and the first."""
+    pairs = list(zip(value, stored, strict=False))
+    if len(value) != len(stored) or len(pairs) <= _SHOWN_NUMBERS:
+        return f"is {_words(value)} (not {_words(stored)})"
+    differing = [n for n, (one, other) in enumerate(pairs) if not abs(one - other) <= _TOLERANCE]
+    one, other = pairs[differing[0]]
+    where = f"differs in {len(differing)} of {len(pairs)} numbers"
+    return f"{where}: that of index {differing[0]} is {one:g} (not {other:g})"
+
+
 def _words(value: tuple[float, ...]) -> str:
-    return ", ".join(f"{number:g}" for number in value)
+    shown = ", ".join(f"{number:g}" for number in value[:_SHOWN_NUMBERS])
+    return f"{shown}, ... ({len(value)} numbers)" if len(value) > _SHOWN_NUMBERS else shown
 
 
 EPISODES = 100
 SEED = 20260
-_SHOWN = 3  # differing values in a message
+_SHOWN, _SHOWN_NUMBERS = 3, 4  # differing values in a message, and numbers of one value
 
 
 @dataclass(frozen=True)
