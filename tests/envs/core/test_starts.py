@@ -93,9 +93,11 @@ def test_differences_are_named_with_both_values():
     assert differences({"a": (1.0,)}, {"a": (1.0, 2.0)}) == ["a is 1 (not 1, 2)"]
     joints = tuple(map(float, range(82)))
     (joint,) = differences({"a/joints": (*joints[:-1], -81.0)}, {"a/joints": joints})
-    assert all(part in joint for part in ("a/joints", "1 of 82", "81", "-81")) and len(joint) < 80
+    assert all(part in joint for part in ("a/joints", "1 of 82", "81", "-81"))
+    assert len(joint) < 80
     (shorter,) = differences({"a/joints": joints[:-1]}, {"a/joints": joints})
-    assert all(part in shorter for part in ("81 numbers", "82 numbers")) and len(shorter) < 120
+    assert all(part in shorter for part in ("81 numbers", "82 numbers"))
+    assert len(shorter) < 120
 
 
 def test_the_rounding_of_processors_is_no_difference():

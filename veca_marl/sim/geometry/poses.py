@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from veca_marl.sim.kernels import kernel
+
 Floats = NDArray[np.float64]
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -49,7 +51,7 @@ def horizontal_distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
     return float(np.hypot(a[0] - b[0], a[1] - b[1]))
 
 
-@njit(cache=True)
+@kernel
 def quaternions_to_matrices(quaternions: Floats, out: Floats) -> None:
     """Write the rotation matrices of quaternions, bit-equal to Bullet's.
 

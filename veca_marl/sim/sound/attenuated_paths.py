@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.diffraction import add_measure, energy_past
 from veca_marl.sim.sound.obstacles import contains_point
 from veca_marl.sim.sound.partitions import N_BANDS
@@ -24,8 +25,8 @@ from veca_marl.sim.sound.silhouettes import (
     Screens,
     Work,
     add_silhouette,
-    line_between,
     make_work,
+    write_line,
 )
 
 Numbers = NDArray[np.int64]
@@ -73,8 +74,9 @@ def energies_inside(
     energies = np.ones((len(lattice), N_BANDS))
     all_of_it = np.zeros((0, 3)), np.zeros((0, 3))
     work = make_work(_most_silhouettes(len(used), len(used), lattice))
+    image = np.empty(3)
     for k in range(len(lattice)):
-        image = _image(source, room, lattice[k])
+        _write_image(source, room, lattice[k], image)
         _write_energy(
             head, image, room, lattice[k], (used, used), all_of_it, screens, surface_ratio, work,
             energies[k],
@@ -117,8 +119,9 @@ def energies_between(
     later = _not_round(room.numbers, source, head, screens)
     most = max(len(room.numbers), len(other.numbers))
     work = make_work(_most_silhouettes(len(first), most, lattice))
+    image = np.empty(3)
     for k in range(n):
-        image = _image(source, room, lattice[k])
+        _write_image(source, room, lattice[k], image)
         _write_energy(
             head, image, room, lattice[k], (first, later), rooms, screens, surface_ratio, work,
             energies[k],
@@ -128,7 +131,7 @@ def energies_between(
     for k in range(1, n):
         for axis in range(3):  # an even number of reflections begins at the opposite wall
             back[axis] = lattice[k, axis] if lattice[k, axis] % 2 else -lattice[k, axis]
-        image = _image(head, other, back)
+        _write_image(head, other, back, image)
         _write_energy(
             source, image, other, back, (first, later), rooms, screens, surface_ratio, work,
             energies[n - 1 + k],
@@ -136,12 +139,12 @@ def energies_between(
     return energies
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _most_silhouettes(n_first: int, n_later: int, lattice: Numbers) -> int:
     """Return how many silhouettes a path can have, see `_write_energy`."""
     most = 0
     for k in range(len(lattice)):
-        most = max(most, np.abs(lattice[k]).sum())
+        most = max(most, _reflections(lattice[k]))
     return n_first + most * n_later
 
 
@@ -162,17 +165,22 @@ def _not_round(numbers: Numbers, one: Floats, other: Floats, screens: Screens) -
     return kept[:n_kept]
 
 
-@njit(cache=True, error_model="numpy")
-def _image(point: Floats, room: Reflector, reflections: Numbers) -> Floats:
-    """Return the image ``(3,)`` of a point, see `image_sources`."""
-    image = np.empty(3)
+@kernel
+def _write_image(point: Floats, room: Reflector, reflections: Numbers, image: Floats) -> None:
+    """Write the image ``(3,)`` of a point, see `image_sources`."""
     for axis in range(3):
         sign, offset = _mirror(room.lower[axis], room.size[axis], reflections[axis])
         image[axis] = sign * point[axis] + offset
-    return image
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
+def _reflections(lattice: Numbers) -> int:
+    """Return how many reflections lead to a copy ``(3,)`` of a room."""
+    count: int = abs(lattice[0]) + abs(lattice[1]) + abs(lattice[2])
+    return count
+
+
+@kernel
 def _mirror(lower: float, size: float, n: int) -> tuple[float, float]:
     """Return the sign and the offset of the coordinates in a copy of a room."""
     if n % 2 == 0:
@@ -180,7 +188,7 @@ def _mirror(lower: float, size: float, n: int) -> tuple[float, float]:
     return -1.0, 2.0 * lower + (n + 1) * size
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _write_energy(
     start: Floats,
     image: Floats,
@@ -210,22 +218,24 @@ def _write_energy(
         work: Overwritten.
         energy: Overwritten.
     """
-    end = image if (start != image).any() else start + np.array([1e-6, 0.0, 0.0])
-    line = line_between(start, end)
-    begin, way = start - room.lower, image - start
-    cell, sign, offset = np.zeros(3, np.int64), np.ones(3), np.zeros(3)
+    length_m = write_line(start, image, work.start, work.frame)
+    line, mirror = Line(work.start, work.frame, length_m), (work.sign, work.offset)
+    begin, way, cell = work.begin, work.way, work.cell
+    for axis in range(3):
+        begin[axis], way[axis] = start[axis] - room.lower[axis], image[axis] - start[axis]
+        cell[axis] = 0
     count, passed = 0, 0.0
     work.reflected[:] = 1.0
-    for leg in range(1 + np.abs(reflections).sum()):
+    for leg in range(1 + _reflections(reflections)):
         until, crossed = _next_wall(begin, way, room.size, cell, reflections)
         is_first = leg == 0
         if is_first and not _is_reflected(begin, way, room.size, reflections, until, crossed):
             energy[:] = 0.0
             return
         for axis in range(3):
-            sign[axis], offset[axis] = _mirror(room.lower[axis], room.size[axis], cell[axis])
-        mirror = sign, offset
-        reach = passed * line.length_m, until * line.length_m
+            sign, offset = _mirror(room.lower[axis], room.size[axis], cell[axis])
+            work.sign[axis], work.offset[axis] = sign, offset
+        reach = passed * length_m, until * length_m
         numbers = used[0] if is_first else used[1]
         count = _add_leg(line, reach, numbers, is_first, rooms, screens, mirror, work, count)
         if crossed < 0:
@@ -235,10 +245,11 @@ def _write_energy(
         cell[crossed] += 1 if way[crossed] > 0.0 else -1
         passed = until
     energy_past(count, screens, surface_ratio, work, energy)
-    energy *= work.reflected
+    for band in range(N_BANDS):
+        energy[band] *= work.reflected[band]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_leg(
     line: Line,
     reach_m: tuple[float, float],
@@ -278,7 +289,7 @@ def _add_leg(
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _lose_in_openings(
     line: Line,
     kind: int,
@@ -309,7 +320,7 @@ def _lose_in_openings(
         work.reflected[band] *= max(1.0 - passed[band], 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _next_wall(
     start: Floats,
     way: Floats,
@@ -337,7 +348,7 @@ def _next_wall(
     return share, crossed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _is_reflected(
     begin: Floats, way: Floats, size: Floats, reflections: Numbers, share: float, crossed: int
 ) -> bool:
@@ -364,7 +375,7 @@ def _is_reflected(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _stretch_inside(line: Line, lower: Floats, upper: Floats) -> tuple[float, float]:
     """Return between which distances along a line it is in a room; the first greater if never."""
     enter_m, leave_m = 0.0, line.length_m

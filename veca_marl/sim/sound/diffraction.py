@@ -22,10 +22,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS, energy_through
 from veca_marl.sim.sound.silhouettes import BOX, LEAF, MOST_SETS, Screens, Work
 
@@ -39,7 +39,7 @@ _NOTHING = 1e-9  # measure
 _ROOT_BANDS: Floats = np.sqrt(BANDS_HZ)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def energy_past(
     count: int, screens: Screens, surface_ratio: float, work: Work, energy: Floats
 ) -> None:
@@ -67,27 +67,30 @@ def energy_past(
         return
     if openness <= 0.0:
         _write_composite(_choose(count, LEAF, False, screens, work), screens, surface_ratio, work)
-        energy[:] = work.part[0]
+        for band in range(N_BANDS):
+            energy[band] = work.part[0, band]
         return
     _write_composite(_choose(count, BOX, True, screens, work), screens, surface_ratio, work)
-    energy[:] = work.part[0]
+    for band in range(N_BANDS):
+        energy[band] = work.part[0, band]
     for m in range(count):
         number = work.numbers[m]
-        if screens.kinds[number] == LEAF and not (work.numbers[:m] == number).any():
+        if screens.kinds[number] == LEAF and not _contains(work.numbers, m, number):
             n_chosen = 0
             for other in range(m, count):
                 if work.numbers[other] == number:
                     work.chosen[n_chosen] = other
                     n_chosen += 1
             _write_composite(n_chosen, screens, surface_ratio, work)
-            energy *= work.part[0]
+            for band in range(N_BANDS):
+                energy[band] *= work.part[0, band]
     if openness < 1.0:
         _write_composite(_choose(count, LEAF, False, screens, work), screens, surface_ratio, work)
         for band in range(N_BANDS):
             energy[band] = energy[band] ** openness * work.part[0, band] ** (1.0 - openness)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _keep_those_that_matter(count: int, work: Work) -> int:
     """Move the silhouettes that matter to the front, those at the least depth first.
 
@@ -101,11 +104,13 @@ def _keep_those_that_matter(count: int, work: Work) -> int:
     for m in range(count):
         if not _matters(rectangles[m]):
             continue
-        left, right, low, high = rectangles[m]
+        left, right = rectangles[m, 0], rectangles[m, 1]
+        low, high = rectangles[m, 2], rectangles[m, 3]
         number, depth, at = numbers[m], depths[m], n_kept
         while at > 0 and depths[at - 1] > depth:
-            rectangles[at], numbers[at] = rectangles[at - 1], numbers[at - 1]
-            depths[at] = depths[at - 1]
+            for side in range(4):
+                rectangles[at, side] = rectangles[at - 1, side]
+            numbers[at], depths[at] = numbers[at - 1], depths[at - 1]
             at -= 1
         rectangles[at, 0], rectangles[at, 1] = left, right
         rectangles[at, 2], rectangles[at, 3] = low, high
@@ -122,7 +127,7 @@ def _keep_those_that_matter(count: int, work: Work) -> int:
     return n_kept
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _matters(rectangle: Floats) -> bool:
     """Return whether a silhouette ``(4,)`` covers more than a negligible part of the energy."""
     root = _ROOT_BANDS[0]
@@ -134,13 +139,13 @@ def _matters(rectangle: Floats) -> bool:
     return not (is_beside or rectangle[2] > 0.0 or rectangle[3] < 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _below(nu: float) -> float:
     """Return the fraction of the energy on the side of an edge below it, F in the module."""
     return 0.5 * (1.0 + nu / math.sqrt(nu * nu + _SPREAD))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def add_measure(rectangle: Floats, weight: float, measures: Floats) -> None:
     """Add the measure ``(N_BANDS,)`` of a silhouette ``(4,)``, multiplied by a weight."""
     for band in range(N_BANDS):
@@ -150,7 +155,7 @@ def add_measure(rectangle: Floats, weight: float, measures: Floats) -> None:
         measures[band] += weight * width * height
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _choose(count: int, kind: int, is_kind: bool, screens: Screens, work: Work) -> int:
     """Choose the silhouettes of one kind of screen, or of all others; return how many these are."""
     n_chosen = 0
@@ -161,7 +166,7 @@ def _choose(count: int, kind: int, is_kind: bool, screens: Screens, work: Work) 
     return n_chosen
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _write_composite(n: int, screens: Screens, surface_ratio: float, work: Work) -> None:
     """Write the energy that passes the n chosen silhouettes, in one plane, to ``part[0]``.
 
@@ -209,7 +214,7 @@ def _write_composite(n: int, screens: Screens, surface_ratio: float, work: Work)
         part[0, band] = min(part[0, band] / (1.0 - NEGLIGIBLE), 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _cover_nothing(n: int, work: Work) -> bool:
     """Return whether the n chosen silhouettes together take a negligible part of the energy."""
     below, chosen, covered = work.below, work.chosen, work.part
@@ -226,7 +231,7 @@ def _cover_nothing(n: int, work: Work) -> bool:
     return most <= NEGLIGIBLE
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _sort_edges(n: int, work: Work) -> None:
     """Sort the edges of the n chosen silhouettes, see `Work.edges` and `Work.ordered`."""
     edges, rectangles, chosen, ordered = work.edges, work.rectangles, work.chosen, work.ordered
@@ -248,7 +253,7 @@ def _sort_edges(n: int, work: Work) -> None:
                 ordered[axis, i + 1, band] = work.below[m, side, band]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _energy_through_all(
     mask: np.int64, screens: Screens, surface_ratio: float, work: Work, known: int
 ) -> None:
@@ -264,7 +269,7 @@ def _energy_through_all(
     if mask == 0:
         work.through[known] = 1.0
         return
-    solid, gaps = np.empty(_MOST, np.int64), np.empty(_MOST)
+    solid, gaps = work.solid, work.gaps
     n_solid = bit = 0
     while mask >> bit:
         number = work.numbers[work.chosen[bit]]
@@ -277,7 +282,7 @@ def _energy_through_all(
     energy_through(n_solid, gaps, surface_ratio, work.through[known])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _contains(numbers: NDArray[np.int64], n: int, number: int) -> bool:
     """Return whether a number is one of the first n."""
     found = False
@@ -286,7 +291,7 @@ def _contains(numbers: NDArray[np.int64], n: int, number: int) -> bool:
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def gap_between(screens: Screens, one: int, other: int) -> float:
     """Return the air between two boxes along an axis of one of them, in metres; 0 if they touch."""
     greatest = 0.0

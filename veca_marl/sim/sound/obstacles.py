@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.silhouettes import BOX, CLOSED, LEAF, Screens
 
 Boxes = tuple[Floats, Floats, Floats]
@@ -371,7 +372,7 @@ def _joints(centres: Floats, rotations: Floats, halves: Floats, rooms: NDArray[n
     return joints
 
 
-@njit(cache=True)
+@kernel
 def contains_point(point: Floats, centre: Floats, rotation: Floats, half: Floats) -> bool:
     """Return whether a point is in a box.
 
@@ -390,7 +391,7 @@ def contains_point(point: Floats, centre: Floats, rotation: Floats, half: Floats
     return True
 
 
-@njit(cache=True)
+@kernel
 def extends_into(
     centre: Floats, rotation: Floats, half: Floats, lower: Floats, size: Floats
 ) -> bool:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 
 BANDS_HZ: Floats = 125.0 * 2.0 ** np.arange(7, dtype=np.float64)
@@ -40,7 +40,7 @@ def surface_ratio(loss_db: float) -> float:
     return float(10.0 ** (loss_db / 20.0)) - 1.0
 
 
-@njit(cache=True)
+@kernel
 def energy_through(n: int, gaps_m: Floats, ratio: float, energy: Floats) -> None:
     """Write the fraction of the energy that passes equal partitions one behind another.
 

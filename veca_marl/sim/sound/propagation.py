@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 from veca_marl.sim.sound.shading import (
@@ -339,7 +339,7 @@ class Propagation:
         return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def read_block(
     powers: NDArray[np.float32],
     start: int,

@@ -18,10 +18,10 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy.fft
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 
 HALF_WIDTH = 8
 KERNEL_TAPS = 2 * HALF_WIDTH
@@ -69,7 +69,7 @@ def farrow_coefficients() -> NDArray[np.float32]:
     return coefficients
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def filter_powers(
     samples: NDArray[np.float32],
     coefficients: NDArray[np.float32],
@@ -96,7 +96,7 @@ def filter_powers(
                 row[i] = total + c2 * samples[t + 2] + c3 * samples[t + 3]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def read_moving(
     powers: NDArray[np.float32],
     start: int,
@@ -332,7 +332,7 @@ class SpectralMixer:
         return mixed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_products(
     spectra: NDArray[np.complex64], filters: NDArray[np.complex64], out: NDArray[np.complex64]
 ) -> None:
@@ -344,7 +344,7 @@ def _add_products(
                 total[f] += signal[f] * response[f]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_changed_products(
     spectra: NDArray[np.complex64],
     before: NDArray[np.complex64],
@@ -366,7 +366,7 @@ def _add_changed_products(
                 first[f] = last[f]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_faded(
     signals: Signals,
     before: NDArray[np.float32],

@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 
@@ -87,6 +88,15 @@ class Work(NamedTuple):
         opening: ``(4,)`` silhouette of an opening in a wall that reflects the path.
         passed: ``(N_BANDS,)`` fraction of the energy that passes the openings of that wall.
         reflected: ``(N_BANDS,)`` fraction that all walls reflect beside their openings.
+        solid: ``(m,)`` screens that sound passes one after another.
+        gaps: ``(m,)`` metres of air between these.
+        start: ``(3,)`` metres, start of the path.
+        frame: ``(3, 3)`` of its line.
+        sign: ``(3,)`` of the coordinates in the copy of the room that it passes, 1 or -1.
+        offset: ``(3,)`` metres, of these.
+        begin: ``(3,)`` metres, start of the path in the coordinates of the room.
+        way: ``(3,)`` metres, from its start to its end.
+        cell: ``(3,)`` the copy of the room that it passes.
     """
 
     corners: Floats
@@ -105,6 +115,15 @@ class Work(NamedTuple):
     opening: Floats
     passed: Floats
     reflected: Floats
+    solid: NDArray[np.int64]
+    gaps: Floats
+    start: Floats
+    frame: Floats
+    sign: Floats
+    offset: Floats
+    begin: Floats
+    way: Floats
+    cell: NDArray[np.int64]
 
 
 @njit(cache=True, error_model="numpy")
@@ -127,16 +146,39 @@ def make_work(most: int) -> Work:
         np.empty(4),
         np.empty(N_BANDS),
         np.empty(N_BANDS),
+        np.empty(most, np.int64),
+        np.empty(most),
+        np.empty(3),
+        np.empty((3, 3)),
+        np.empty(3),
+        np.empty(3),
+        np.empty(3),
+        np.empty(3),
+        np.empty(3, np.int64),
     )
 
 
-@njit(cache=True, error_model="numpy")
-def line_between(start: Floats, end: Floats) -> Line:
-    """Return the line from one point ``(3,)`` to another; they must not be equal."""
-    way = end - start
-    length_m = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-    frame = np.zeros((3, 3))
-    frame[0] = way / length_m
+@kernel
+def write_line(start: Floats, end: Floats, line: Floats, frame: Floats) -> float:
+    """Write the start and the frame of the line from one point ``(3,)`` to another, see `Line`.
+
+    Points that are equal have a line along x.
+
+    Returns:
+        Metres, its length.
+    """
+    square = 0.0
+    for axis in range(3):
+        line[axis] = start[axis]
+        frame[0, axis] = end[axis] - start[axis]
+        square += frame[0, axis] ** 2
+        frame[1, axis] = 0.0
+    if start[0] == end[0] and start[1] == end[1] and start[2] == end[2]:
+        frame[0, 0] = start[0] + 1e-6 - start[0]
+        square = frame[0, 0] ** 2
+    length_m = math.sqrt(square)
+    for axis in range(3):
+        frame[0, axis] /= length_m
     flat = math.hypot(frame[0, 0], frame[0, 1])
     if flat > 1e-9:
         frame[1, 0], frame[1, 1] = -frame[0, 1] / flat, frame[0, 0] / flat
@@ -145,10 +187,10 @@ def line_between(start: Floats, end: Floats) -> Line:
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
         frame[2, axis] = frame[0, i] * frame[1, j] - frame[0, j] * frame[1, i]
-    return Line(start, frame, length_m)
+    return length_m
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def add_silhouette(
     line: Line,
     begin_m: float,
@@ -199,7 +241,7 @@ def add_silhouette(
     return 0.5 * (begin_m + end_m)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _write_corners(
     line: Line, screens: Screens, number: int, mirror: tuple[Floats, Floats], corners: Floats
 ) -> tuple[float, float, float]:
@@ -232,7 +274,7 @@ def _write_corners(
     return least, most, beside
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_section(length_m: float, at_m: float, work: Work) -> None:
     """Extend a silhouette by the section of a box with a plane across the line.
 
@@ -256,7 +298,7 @@ def _add_section(length_m: float, at_m: float, work: Work) -> None:
             _add_point(length_m, at_m, across, above, work)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _add_point(length_m: float, along: float, across: float, above: float, work: Work) -> None:
     """Extend a silhouette by a point of a box, in metres in the frame of the line."""
     extent, detour = work.extent, work.detour
@@ -273,7 +315,7 @@ def _add_point(length_m: float, along: float, across: float, above: float, work:
         detour[least], detour[most] = min(detour[least], more), max(detour[most], more)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _seal(
     line: Line,
     screens: Screens,

@@ -19,6 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.attenuated_paths import Reflector, energies_between, energies_inside
 from veca_marl.sim.sound.obstacles import Doorway, Obstacles, ScreenSets
 from veca_marl.sim.sound.partitions import (
@@ -356,7 +357,7 @@ class House:
         return nearest
 
 
-@njit(cache=True)
+@kernel
 def nearest_box(point: Floats, lower: Floats, upper: Floats) -> int:
     """Return which of the boxes ``(n, 3)`` is nearest to a point ``(3,)``, the first of equals."""
     nearest, least = 0, np.inf

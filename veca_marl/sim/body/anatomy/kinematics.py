@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
 from veca_marl.sim.geometry import Floats, Primitive, Shape
+from veca_marl.sim.kernels import kernel
 
 
-@njit(cache=True)
+@kernel
 def rotate_about_axis(rotation: Floats, axis: Floats, angle: float, out: Floats) -> None:
     """Write `rotation` times the rotation about an axis (Rodrigues) to `out`, also in place."""
     c, s = math.cos(angle), math.sin(angle)
@@ -29,7 +30,7 @@ def rotate_about_axis(rotation: Floats, axis: Floats, angle: float, out: Floats)
         out[i, 2] = a * m02 + b * m12 + e * m22
 
 
-@njit(cache=True)
+@kernel
 def _kinematics(
     parents: NDArray[np.int64],
     origins: Floats,
@@ -211,7 +212,7 @@ class Underside:
         _put_on(surface_m, self.frames, self.offsets, self.radii, positions, rotations)
 
 
-@njit(cache=True)
+@kernel
 def _lowest_m(
     frames: NDArray[np.int64], offsets: Floats, radii: Floats, positions: Floats, rotations: Floats
 ) -> float:
@@ -232,7 +233,7 @@ def _lowest_m(
     return lowest
 
 
-@njit(cache=True)
+@kernel
 def _put_on(
     surface_m: float,
     frames: NDArray[np.int64],

@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
 from veca_marl.sim.body.humanoid.bone_ends import BoneEnds, excess_m
 from veca_marl.sim.body.humanoid.implicit_torques import (
@@ -46,6 +45,7 @@ from veca_marl.sim.body.humanoid.link_tree import (
     empty_state,
 )
 from veca_marl.sim.geometry import Floats, quaternions_to_matrices
+from veca_marl.sim.kernels import kernel
 
 # impulse on the whole body in a physics step below which nothing may touch it; its weight gives
 # 0.8 N s
@@ -58,26 +58,37 @@ UNKNOWN, TOUCHED, FREE = 0, 1, 2
 SETTLED, NEW_POSE, UNDECIDED = 0, 1, 2
 
 
-@njit(cache=True)
+@kernel
 def begin(
     tree: LinkTree, solver: SolverState, state: BodyState, links: LinkArrays, forces: JointForces
 ) -> None:
     """Take over Bullet's state; the forces of earlier steps are set to 0."""
-    state.position[:] = solver.position
+    for i in range(3):
+        state.position[i] = solver.position[i]
     quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
-    state.angles[:], state.velocity[:] = solver.angles, solver.velocity
+    _take_over(solver, state)
     locate_links(tree, state.rotation, state.angles, links)
     write_mass_matrix(tree, links, state.centre, state.mass_matrix)
     write_bias(tree, links, state.velocity, state.bias)
     forces.scratch[:] = 0.0
     add_product(tree.depths, tree.paths, state.mass_matrix, state.velocity, forces.scratch)
-    state.momentum[:] = forces.scratch[:6]
+    for i in range(6):
+        state.momentum[i] = forces.scratch[i]
     add_cross(state.momentum[3:], state.centre, state.momentum[:3])
     forces.predicted[:], forces.before[:] = 0.0, 0.0
     forces.torques[:], forces.held[:] = 0.0, 0.0
 
 
-@njit(cache=True)
+@kernel
+def _take_over(solver: SolverState, state: BodyState) -> None:
+    """Copy joint angles and velocities."""
+    for k in range(state.angles.shape[0]):
+        state.angles[k] = solver.angles[k]
+    for i in range(state.velocity.shape[0]):
+        state.velocity[i] = solver.velocity[i]
+
+
+@kernel
 def settle(
     tree: LinkTree,
     limits: JointLimits,
@@ -113,57 +124,62 @@ def settle(
         the base differs from Bullet's: `NEW_POSE` or `SETTLED`. Its velocity always differs;
         `solver.changed` has the joints that differ.
     """
-    goal, mass = np.empty(3), np.sum(tree.masses)
+    mass = np.sum(tree.masses)
     write_external_forces(tree, step_s, solver, state, forces)
-    if not _add_impulse(step_s, weight, contact, forces.external, state):
+    if not _add_impulse(step_s, weight, contact, forces, state):
         return UNDECIDED
     solver.changed[:] = False
     write_speeds(tree, step_s, solver, state, forces)
     predict(forces)
-    for i in range(3):
-        goal[i] = state.position[i] + state.centre[i] + step_s * state.momentum[3 + i] / mass
+    for i in range(3):  # of the centre of mass
+        state.position[i] = (
+            state.position[i] + state.centre[i] + step_s * state.momentum[3 + i] / mass
+        )
     result = SETTLED
     if _apply_limits(limits, state.mass_matrix, solver):
-        _turn_base(tree, state.mass_matrix, solver)
+        _turn_base(tree, state.mass_matrix, forces.matrix, solver)
         result = NEW_POSE
     quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
-    state.angles[:] = solver.angles
+    for k in range(state.angles.shape[0]):
+        state.angles[k] = solver.angles[k]
     locate_links(tree, state.rotation, state.angles, links)
     write_mass_matrix(tree, links, state.centre, state.mass_matrix)
     for i in range(3):
-        state.position[i] = goal[i] - state.centre[i]
+        state.position[i] -= state.centre[i]
     state.position[2] += excess_m(ends, links, state.position[2])
     for i in range(3):
         if abs(state.position[i] - solver.position[i]) > _SAME_PLACE_M:
             result = NEW_POSE
-    _write_velocity(tree, state, solver.velocity)
+    _write_velocity(tree, state, solver.velocity, forces)
     write_bias(tree, links, state.velocity, state.bias)
     return result
 
 
-@njit(cache=True)
+@kernel
 def _add_impulse(
-    step_s: float, weight: Floats, contact: int, external: Floats, state: BodyState
+    step_s: float, weight: Floats, contact: int, forces: JointForces, state: BodyState
 ) -> bool:
     """Add the impulse of external forces to the momentum; return false if contacts are unknown.
 
     Bullet applies the two friction forces of a contact of the body with itself at points that
     differ by the penetration. The torque that remains is dropped where no other body is touched.
     """
-    impulse, square = np.zeros(6), 0.0
+    impulse, external, square = forces.scratch[:6], forces.external, 0.0
     for i in range(3):
-        impulse[3 + i] = step_s * weight[i]
+        impulse[i], impulse[3 + i] = 0.0, step_s * weight[i]
         square += (step_s * (external[3 + i] - weight[i])) ** 2
     if contact == UNKNOWN and square < _NO_FORCE_NS**2:
         return False
     if contact != FREE:
-        impulse[:] = step_s * external[:6]
+        for i in range(6):
+            impulse[i] = step_s * external[i]
         add_cross(impulse[3:], state.centre, impulse[:3])
-    state.momentum[:] += impulse
+    for i in range(6):
+        state.momentum[i] += impulse[i]
     return True
 
 
-@njit(cache=True)
+@kernel
 def _apply_limits(limits: JointLimits, mass_matrix: Floats, solver: SolverState) -> bool:
     """Clip angles and joint speeds; return whether an angle was clipped.
 
@@ -186,10 +202,10 @@ def _apply_limits(limits: JointLimits, mass_matrix: Floats, solver: SolverState)
     return turned
 
 
-@njit(cache=True)
-def _turn_base(tree: LinkTree, mass_matrix: Floats, solver: SolverState) -> None:
+@kernel
+def _turn_base(tree: LinkTree, mass_matrix: Floats, block: Floats, solver: SolverState) -> None:
     """Rotate the base by as much as it reacts on the changes of angles."""
-    _solve_base(tree, mass_matrix, solver.turn)
+    _solve_base(tree, mass_matrix, block, solver.turn)
     turn, q = solver.turn, solver.quaternion
     angle = math.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
     share = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
@@ -201,25 +217,34 @@ def _turn_base(tree: LinkTree, mass_matrix: Floats, solver: SolverState) -> None
     q[3] = w * q[3] - a * x - b * y - c * z
 
 
-@njit(cache=True)
-def _solve_base(tree: LinkTree, mass_matrix: Floats, x: Floats) -> None:
-    """Replace a right side ``(6,)`` by the solution with the base's block of the mass matrix."""
-    block = mass_matrix[:6].copy()
+@kernel
+def _solve_base(tree: LinkTree, mass_matrix: Floats, block: Floats, x: Floats) -> None:
+    """Replace a right side ``(6,)`` by the solution with the base's block of the mass matrix.
+
+    The first rows of `block` are overwritten by its factor.
+    """
+    for i in range(6):
+        for j in range(i + 1):
+            block[i, j] = mass_matrix[i, j]
     factorise(tree.depths[:6], tree.paths[:6], block)
     solve(tree.depths[:6], tree.paths[:6], block, x)
 
 
-@njit(cache=True)
-def _write_velocity(tree: LinkTree, state: BodyState, velocity: Floats) -> None:
+@kernel
+def _write_velocity(
+    tree: LinkTree, state: BodyState, velocity: Floats, forces: JointForces
+) -> None:
     """Write the velocity of the base that gives the body its momentum at the new pose."""
-    base = state.momentum.copy()
+    base = forces.scratch[:6]
+    for i in range(6):
+        base[i] = state.momentum[i]
     add_cross(state.centre, state.momentum[3:], base[:3])
     for j in range(6, velocity.shape[0]):
         for i in range(6):
             base[i] -= state.mass_matrix[j, i] * velocity[j]
-    _solve_base(tree, state.mass_matrix, base)
-    state.velocity[:6] = base
-    state.velocity[6:] = velocity[6:]
+    _solve_base(tree, state.mass_matrix, forces.matrix, base)
+    for i in range(velocity.shape[0]):
+        state.velocity[i] = base[i] if i < 6 else velocity[i]
 
 
 class BodyDynamics:

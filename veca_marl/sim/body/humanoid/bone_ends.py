@@ -13,13 +13,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Skeleton, Underside, bone_of, forward_kinematics
 from veca_marl.sim.body.humanoid.inertial_forces import locate_links
 from veca_marl.sim.body.humanoid.link_tree import LinkArrays, LinkTree, empty_links, link_rows
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.physics.bullet_client import BulletClient
 
 # bones of lying, sitting and crawling bodies are at most 20 mm in the floor, those of bodies under
@@ -74,7 +74,7 @@ def bone_ends(
     return BoneEnds(owners, np.ascontiguousarray(offsets), under.radii)
 
 
-@njit(cache=True)
+@kernel
 def excess_m(ends: BoneEnds, links: LinkArrays, height_m: float) -> float:
     """Return by how much the deepest bone is deeper than `DEEPEST_M`; 0 if none is.
 

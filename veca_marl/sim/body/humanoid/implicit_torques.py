@@ -11,7 +11,6 @@ without these zeros: element d of row i is that of column ``paths[i, d]``, see `
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.humanoid.link_tree import (
@@ -22,11 +21,12 @@ from veca_marl.sim.body.humanoid.link_tree import (
     SolverState,
 )
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 
 Indices = NDArray[np.int64]
 
 
-@njit(cache=True)
+@kernel
 def factorise(depths: Indices, paths: Indices, matrix: Floats) -> None:
     """Replace the lower half of a matrix M by L with ``M = L^T L`` (Featherstone 2008, table 6.3).
 
@@ -47,7 +47,7 @@ def factorise(depths: Indices, paths: Indices, matrix: Floats) -> None:
                 matrix[row, e] -= share * matrix[k, e]
 
 
-@njit(cache=True)
+@kernel
 def solve(depths: Indices, paths: Indices, factor: Floats, x: Floats) -> None:
     """Replace the right side ``(m,)`` by the solution, with the factor from `factorise`."""
     for i in range(depths.shape[0] - 1, -1, -1):
@@ -62,7 +62,7 @@ def solve(depths: Indices, paths: Indices, factor: Floats, x: Floats) -> None:
         x[i] /= factor[i, last]
 
 
-@njit(cache=True)
+@kernel
 def add_product(depths: Indices, paths: Indices, matrix: Floats, x: Floats, out: Floats) -> None:
     """Add the product of a matrix and a vector ``(m,)`` to `out`."""
     for i in range(depths.shape[0]):
@@ -92,7 +92,7 @@ _RETURN_SPEED_RADPS = 1.0
 _SAME_SPEED_RADPS = 1e-4  # difference of joint speeds below which Bullet's are kept
 
 
-@njit(cache=True)
+@kernel
 def write_torques(
     tree: LinkTree, limits: JointLimits, step_s: float, state: BodyState, forces: JointForces
 ) -> None:
@@ -126,14 +126,14 @@ def write_torques(
             forces.torques[k] -= share * (forces.accelerations[i] - stop)
 
 
-@njit(cache=True)
+@kernel
 def _resistance(k: int, step_s: float, forces: JointForces) -> float:
     """Return by how much the torque of a joint decreases with its speed, N m s/rad."""
     total: float = forces.damping[k] + step_s * forces.stiffness[k]
     return total
 
 
-@njit(cache=True)
+@kernel
 def _accelerate(
     tree: LinkTree, limits: JointLimits, step_s: float, state: BodyState, forces: JointForces
 ) -> None:
@@ -156,7 +156,7 @@ def _accelerate(
     solve(tree.depths, tree.paths, matrix, right)
 
 
-@njit(cache=True)
+@kernel
 def _stop_acceleration(
     k: int, limits: JointLimits, step_s: float, state: BodyState, forces: JointForces
 ) -> float:
@@ -174,7 +174,7 @@ def _stop_acceleration(
     return change / step_s
 
 
-@njit(cache=True)
+@kernel
 def _revise(limits: JointLimits, step_s: float, state: BodyState, forces: JointForces) -> bool:
     """Hold joints that would enter a margin, release those that pull; return if any changed."""
     changed = False
@@ -193,7 +193,7 @@ def _revise(limits: JointLimits, step_s: float, state: BodyState, forces: JointF
     return changed
 
 
-@njit(cache=True)
+@kernel
 def write_speeds(
     tree: LinkTree, step_s: float, solver: SolverState, state: BodyState, forces: JointForces
 ) -> None:
@@ -213,7 +213,10 @@ def write_speeds(
         state: The state before the step.
         forces: As `write_torques` left them, with `external`, the forces that acted.
     """
-    if not np.any(forces.stiffness > 0.0):
+    stiffest = 0.0
+    for k in range(forces.stiffness.shape[0]):
+        stiffest = max(stiffest, forces.stiffness[k])
+    if stiffest == 0.0:
         return
     for i in range(forces.scratch.shape[0]):
         forces.scratch[i] = forces.external[i] - forces.predicted[i]
@@ -226,7 +229,7 @@ def write_speeds(
             solver.changed[i - 6] = True
 
 
-@njit(cache=True)
+@kernel
 def write_external_forces(
     tree: LinkTree, step_s: float, solver: SolverState, state: BodyState, forces: JointForces
 ) -> None:
@@ -244,12 +247,13 @@ def write_external_forces(
     """
     for i in range(state.velocity.shape[0]):
         forces.scratch[i] = (solver.velocity[i] - state.velocity[i]) / step_s
-    forces.external[:] = state.bias
-    forces.external[6:] -= forces.torques
+        forces.external[i] = state.bias[i]
+        if i >= 6:
+            forces.external[i] -= forces.torques[i - 6]
     add_product(tree.depths, tree.paths, state.mass_matrix, forces.scratch, forces.external)
 
 
-@njit(cache=True)
+@kernel
 def predict(forces: JointForces) -> None:
     """Predict the external forces of the next step: the mean of those of the last two steps.
 
@@ -258,4 +262,4 @@ def predict(forces: JointForces) -> None:
     """
     for i in range(forces.external.shape[0]):
         forces.predicted[i] = 0.5 * (forces.external[i] + forces.before[i])
-    forces.before[:] = forces.external
+        forces.before[i] = forces.external[i]

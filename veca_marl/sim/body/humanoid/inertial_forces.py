@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
-
 from veca_marl.sim.body.anatomy import rotate_about_axis
 from veca_marl.sim.body.humanoid.link_tree import LinkArrays, LinkTree
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 
 
-@njit(cache=True)
+@kernel
 def cross_into(a: Floats, b: Floats, out: Floats) -> None:
     """Write the cross product of two vectors ``(3,)``; `out` must be another array."""
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -18,7 +16,7 @@ def cross_into(a: Floats, b: Floats, out: Floats) -> None:
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@kernel
 def add_cross(a: Floats, b: Floats, out: Floats) -> None:
     """Add the cross product of two vectors ``(3,)`` to `out`, which must be another array."""
     out[0] += a[1] * b[2] - a[2] * b[1]
@@ -26,7 +24,7 @@ def add_cross(a: Floats, b: Floats, out: Floats) -> None:
     out[2] += a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@kernel
 def multiply_into(a: Floats, b: Floats, out: Floats) -> None:
     """Write the product of two matrices ``(3, 3)``; `out` must be another array."""
     for i in range(3):
@@ -34,7 +32,7 @@ def multiply_into(a: Floats, b: Floats, out: Floats) -> None:
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@njit(cache=True)
+@kernel
 def add_rotated(rotation: Floats, vector: Floats, out: Floats) -> None:
     """Add a rotated vector ``(3,)`` to `out`, which must be another array."""
     for i in range(3):
@@ -43,7 +41,7 @@ def add_rotated(rotation: Floats, vector: Floats, out: Floats) -> None:
         )
 
 
-@njit(cache=True)
+@kernel
 def _momentum(mass: float, moment: Floats, inertia: Floats, motion: Floats, out: Floats) -> None:
     """Write a spatial inertia times a spatial velocity."""
     for i in range(3):
@@ -53,15 +51,21 @@ def _momentum(mass: float, moment: Floats, inertia: Floats, motion: Floats, out:
     add_cross(motion[:3], moment, out[3:])
 
 
-@njit(cache=True)
+@kernel
 def write_mass_matrix(tree: LinkTree, links: LinkArrays, centre: Floats, out: Floats) -> None:
     """Write the mass matrix, stored as in `factorisation`, and the centre of mass ``(3,)``.
 
     Composite-rigid-body algorithm (Featherstone 2008, table 6.2). The base's rows times the
     generalised velocity are the angular momentum about the reference point and the momentum.
     """
-    mass, moment, inertia = tree.masses.copy(), links.moments.copy(), links.inertias.copy()
-    force, unit = np.empty(6), np.zeros(6)
+    mass, moment, inertia = links.scratch.masses, links.scratch.moments, links.scratch.inertias
+    force, unit = links.scratch.six[0], links.scratch.six[1]
+    for link in range(tree.parents.shape[0]):
+        mass[link] = tree.masses[link]
+        for i in range(3):
+            moment[link, i] = links.moments[link, i]
+            for j in range(3):
+                inertia[link, i, j] = links.inertias[link, i, j]
     for link in range(tree.parents.shape[0] - 1, 0, -1):
         _momentum(mass[link], moment[link], inertia[link], links.hinges[link - 1], force)
         _write_row(tree, links.hinges, link, force, out)
@@ -75,12 +79,13 @@ def write_mass_matrix(tree: LinkTree, links: LinkArrays, centre: Floats, out: Fl
         unit[:] = 0.0
         unit[i] = 1.0
         _momentum(mass[0], moment[0], inertia[0], unit, force)
-        out[i, : i + 1] = force[: i + 1]
+        for j in range(i + 1):
+            out[i, j] = force[j]
     for i in range(3):
         centre[i] = moment[0, i] / mass[0]
 
 
-@njit(cache=True)
+@kernel
 def _write_row(tree: LinkTree, hinges: Floats, link: int, force: Floats, out: Floats) -> None:
     """Write the row of a hinge: its force on the base, its ancestors and itself."""
     row = 5 + link
@@ -93,7 +98,7 @@ def _write_row(tree: LinkTree, hinges: Floats, link: int, force: Floats, out: Fl
         out[row, d] = total
 
 
-@njit(cache=True)
+@kernel
 def write_bias(tree: LinkTree, links: LinkArrays, velocity: Floats, out: Floats) -> None:
     """Write the forces ``(6 + n,)`` that keep all generalised velocities constant, without weight.
 
@@ -101,8 +106,10 @@ def write_bias(tree: LinkTree, links: LinkArrays, velocity: Floats, out: Floats)
     ``mass matrix @ acceleration + bias = generalised forces``.
     """
     count = tree.parents.shape[0]
-    motion, change, force = np.zeros((count, 6)), np.zeros((count, 6)), np.zeros((count, 6))
-    motion[0] = velocity[:6]
+    motion, change, force = links.scratch.motion, links.scratch.change, links.scratch.force
+    change[0], momentum = 0.0, links.scratch.six[0]
+    for k in range(6):
+        motion[0, k] = velocity[k]
     # the base's velocity is that of a point that moves with the base
     add_cross(motion[0, 3:], motion[0, :3], change[0, 3:])
     for link in range(count):
@@ -119,12 +126,13 @@ def write_bias(tree: LinkTree, links: LinkArrays, velocity: Floats, out: Floats)
             links.inertias[link],
             motion[link],
             change[link],
+            momentum,
             force[link],
         )
     _collect(tree, links.hinges, force, out)
 
 
-@njit(cache=True)
+@kernel
 def _add_motion_cross(motion: Floats, hinge: Floats, rate: float, out: Floats) -> None:
     """Add the spatial cross product of a velocity and `rate` times a hinge to `out`."""
     w, u = motion[:3], motion[3:]
@@ -138,12 +146,17 @@ def _add_motion_cross(motion: Floats, hinge: Floats, rate: float, out: Floats) -
     out[5] += w[0] * q - w[1] * p + u[0] * y - u[1] * x
 
 
-@njit(cache=True)
+@kernel
 def _write_force(
-    mass: float, moment: Floats, inertia: Floats, motion: Floats, change: Floats, out: Floats
+    mass: float,
+    moment: Floats,
+    inertia: Floats,
+    motion: Floats,
+    change: Floats,
+    momentum: Floats,
+    out: Floats,
 ) -> None:
     """Write the force on a link: inertia times acceleration plus the change of its momentum."""
-    momentum = np.empty(6)
     _momentum(mass, moment, inertia, change, out)
     _momentum(mass, moment, inertia, motion, momentum)
     add_cross(motion[:3], momentum[:3], out[:3])
@@ -151,7 +164,7 @@ def _write_force(
     add_cross(motion[:3], momentum[3:], out[3:])
 
 
-@njit(cache=True)
+@kernel
 def _collect(tree: LinkTree, hinges: Floats, force: Floats, out: Floats) -> None:
     """Project the forces of all links on the hinges and the base."""
     for link in range(tree.parents.shape[0] - 1, 0, -1):
@@ -160,10 +173,11 @@ def _collect(tree: LinkTree, hinges: Floats, force: Floats, out: Floats) -> None
             total += hinges[link - 1, k] * force[link, k]
             force[parent, k] += force[link, k]
         out[5 + link] = total
-    out[:6] = force[0]
+    for k in range(6):
+        out[k] = force[0, k]
 
 
-@njit(cache=True)
+@kernel
 def locate_links(tree: LinkTree, rotation: Floats, angles: Floats, links: LinkArrays) -> None:
     """Write where the links are.
 
@@ -173,13 +187,16 @@ def locate_links(tree: LinkTree, rotation: Floats, angles: Floats, links: LinkAr
         angles: ``(n,)`` rad.
         links: Written.
     """
-    turned, centre = np.empty((3, 3)), np.empty(3)
-    links.rotations[0] = rotation
-    links.origins[0] = 0.0
+    turned, centre = links.scratch.turned, links.scratch.centre
+    for i in range(3):
+        links.origins[0, i] = 0.0
+        for j in range(3):
+            links.rotations[0, i, j] = rotation[i, j]
     for link in range(tree.parents.shape[0]):
         if link > 0:
             _place_on_parent(tree, link, angles[link - 1], links, turned)
-        centre[:] = links.origins[link]
+        for i in range(3):
+            centre[i] = links.origins[link, i]
         add_rotated(links.rotations[link], tree.centres[link], centre)
         for i in range(3):
             links.moments[link, i] = tree.masses[link] * centre[i]
@@ -189,13 +206,14 @@ def locate_links(tree: LinkTree, rotation: Floats, angles: Floats, links: LinkAr
         )
 
 
-@njit(cache=True)
+@kernel
 def _place_on_parent(
     tree: LinkTree, link: int, angle: float, links: LinkArrays, turned: Floats
 ) -> None:
     """Write rotation, origin and hinge of a link from those of its parent."""
     parent, hinge = tree.parents[link], links.hinges[link - 1]
-    links.origins[link] = links.origins[parent]
+    for i in range(3):
+        links.origins[link, i] = links.origins[parent, i]
     add_rotated(links.rotations[parent], tree.positions[link], links.origins[link])
     rotate_about_axis(tree.rotations[link], tree.axes[link], angle, turned)
     multiply_into(links.rotations[parent], turned, links.rotations[link])
@@ -204,7 +222,7 @@ def _place_on_parent(
     cross_into(links.origins[link], hinge[:3], hinge[3:])
 
 
-@njit(cache=True)
+@kernel
 def _write_inertia(
     turned: Floats, rotation: Floats, mass: float, centre: Floats, out: Floats
 ) -> None:

@@ -18,6 +18,32 @@ from veca_marl.sim.geometry import Floats, Inertia, Pose, joined_inertia
 from veca_marl.sim.physics.bullet_client import BulletClient, pybullet
 
 
+class LinkScratch(NamedTuple):
+    """Arrays that the functions of a tree of n hinges overwrite: they allocate none.
+
+    Attributes:
+        masses: ``(n + 1,)`` kg, of a link and all that hangs on it.
+        moments: ``(n + 1, 3)`` kg m, of these.
+        inertias: ``(n + 1, 3, 3)`` kg m^2, of these.
+        motion: ``(n + 1, 6)`` spatial velocities.
+        change: ``(n + 1, 6)`` spatial accelerations without those of the hinges.
+        force: ``(n + 1, 6)`` spatial forces.
+        turned: ``(3, 3)`` a rotation or an inertia.
+        centre: ``(3,)`` metres, the centre of mass of a link.
+        six: ``(2, 6)`` spatial vectors.
+    """
+
+    masses: Floats
+    moments: Floats
+    inertias: Floats
+    motion: Floats
+    change: Floats
+    force: Floats
+    turned: Floats
+    centre: Floats
+    six: Floats
+
+
 class LinkArrays(NamedTuple):
     """Where the links of a tree of n hinges are; written by `locate_links`.
 
@@ -27,6 +53,7 @@ class LinkArrays(NamedTuple):
         hinges: ``(n, 6)`` spatial velocity of each link for 1 rad/s of its hinge.
         moments: ``(n + 1, 3)`` kg m, mass times centre of mass from the reference point.
         inertias: ``(n + 1, 3, 3)`` kg m^2 about the reference point, world axes.
+        scratch: Overwritten.
     """
 
     rotations: Floats
@@ -34,6 +61,7 @@ class LinkArrays(NamedTuple):
     hinges: Floats
     moments: Floats
     inertias: Floats
+    scratch: LinkScratch
 
 
 class BodyState(NamedTuple):
@@ -98,6 +126,17 @@ def empty_links(hinges: int) -> LinkArrays:
         hinges=np.zeros((hinges, 6)),
         moments=np.zeros((hinges + 1, 3)),
         inertias=np.zeros((hinges + 1, 3, 3)),
+        scratch=LinkScratch(
+            masses=np.zeros(hinges + 1),
+            moments=np.zeros((hinges + 1, 3)),
+            inertias=np.zeros((hinges + 1, 3, 3)),
+            motion=np.zeros((hinges + 1, 6)),
+            change=np.zeros((hinges + 1, 6)),
+            force=np.zeros((hinges + 1, 6)),
+            turned=np.zeros((3, 3)),
+            centre=np.zeros(3),
+            six=np.zeros((2, 6)),
+        ),
     )
 
 

@@ -1,0 +1,44 @@
+"""Compilation of kernels that allocate nothing, without reference counts of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import NoneType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numba import njit
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function that creates no array and returns none, a decorator.
+
+    All arrays that it needs are arguments, those that it overwrites too. Numba counts the
+    references to each array that a function takes out of a tuple, by atomic operations: up to half
+    of the processor time where arguments are named tuples. Where no array is created, nothing has
+    to be counted. Numba refuses to compile a function that allocates. What a kernel calls must be a
+    kernel too, or return no array, which nobody would free.
+
+    Divisions by zero give infinite numbers.
+
+    Raises:
+        TypeError: If what it returns may be an array.
+    """
+    returned = get_type_hints(function)["return"]
+    if not _is_plain(returned):
+        raise TypeError(f"kernel {function.__name__} returns {returned}, not numbers")
+    # `_nrt` is an option of all targets that Numba's type stubs omit
+    options: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+    compiled: Function = njit(**options)(function)
+    return compiled
+
+
+def _is_plain(returned: Any) -> bool:
+    """Return whether a type consists of numbers alone, also in tuples."""
+    if get_origin(returned) is tuple:
+        return all(map(_is_plain, get_args(returned)))
+    return isinstance(returned, type) and issubclass(
+        returned, (bool, int, float, np.generic, NoneType)
+    )
