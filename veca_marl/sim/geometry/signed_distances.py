@@ -31,7 +31,6 @@ from veca_marl.sim.geometry.polyhedra import (
 )
 from veca_marl.sim.geometry.poses import Floats, Vector
 from veca_marl.sim.geometry.primitives import Primitive, Shape
-from veca_marl.sim.kernels import kernel
 
 DistanceAndGradient: TypeAlias = tuple[float, float, float, float]
 Solid: TypeAlias = tuple[int, Vector] | tuple[Floats, Vector]
@@ -78,7 +77,7 @@ def is_inside(shape: int, size: Vector, x: float, y: float, z: float) -> bool:
     return x * x + y * y + z * z < size[0] * size[0]
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def distance_and_gradient(
     shape: int, size: Vector, x: float, y: float, z: float
 ) -> DistanceAndGradient:
@@ -138,7 +137,7 @@ def _from_cylinder(radius: float, half: float, x: float, y: float, z: float) -> 
     return end, 0.0, 0.0, sz
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def entry_distance(shape: int, size: Vector, point: Vector, direction: Vector) -> float:
     """Return the distance from a point outside a primitive to where a ray enters it.
 
@@ -297,7 +296,7 @@ overload(solid_entry, jit_options=_OPTIONS)(
 )
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def _write_distances(solid: Solid, points: Floats, out: Floats) -> None:
     for i in range(points.shape[0]):
         out[i] = solid_distance(solid, points[i, 0], points[i, 1], points[i, 2])

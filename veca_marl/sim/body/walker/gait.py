@@ -14,11 +14,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Growth, Skeleton
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import kernel
 
 _ROUNDING_RAD = 1e-9
 
@@ -83,7 +83,7 @@ class Neck:
         _distribute(angles, bends, self._pairs, self._low, self._high)
 
 
-@kernel
+@njit(cache=True)
 def _distribute(
     angles: Floats,
     bends: tuple[float, float, float],
@@ -267,7 +267,7 @@ class Stride(NamedTuple):
     stance_s: float
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def write_stride(angles: Floats, stride: Stride, cfg: GaitCfg, legs: Legs) -> None:
     """Write the angles of legs and arms, each arm in opposition to the leg of its side.
 
@@ -294,7 +294,7 @@ def write_stride(angles: Floats, stride: Stride, cfg: GaitCfg, legs: Legs) -> No
         angles[legs.elbow[side]] = cfg.elbow_rad
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def _foothold(
     stride: Stride, cfg: GaitCfg, hip_y_m: float, time_s: float
 ) -> tuple[float, float, float]:
@@ -317,7 +317,7 @@ def _foothold(
     return c * x + s * y, c * y - s * x - hip_y_m, -turned
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def place_foot(
     angles: Floats,
     side: int,
@@ -472,7 +472,7 @@ class Gait:
         self.angles[self._legs.foot[1]] = _KICK_TOES_RAD * (1.0 - done)
 
 
-@kernel
+@njit(cache=True)
 def clip(angles: Floats, low: Floats, high: Floats) -> None:
     """Clip angles ``(n,)`` to their limits ``(n,)`` in place."""
     for i in range(len(angles)):
