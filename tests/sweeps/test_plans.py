@@ -21,7 +21,7 @@ CONFIG = {
     "log": {"video": True},
     "experiment": {"name": "x", "arm": "a", "claims": []},
     "seed": 0,
-    "collect": {"groups": 2, "processes": None, "threads": 1},
+    "collect": {"groups": 2, "processes": None, "threads": 1, "engine": "processes"},
 }
 
 
@@ -140,8 +140,10 @@ def test_what_a_run_has_decided_itself_does_not_differ():
 
 
 def test_runs_at_a_time_fill_the_cores():
-    two = {**CONFIG, "collect": {"groups": 2, "processes": 2, "threads": 1}, "threads": 1}
+    two = {**CONFIG, "collect": {**CONFIG["collect"], "processes": 2}, "threads": 1}
+    actors = {**CONFIG, "collect": {**CONFIG["collect"], "engine": "ray"}}
     assert (cores_of(CONFIG), cores_of(two), cores_of({**two, "threads": 4})) == (1, 2, 4)
+    assert cores_of(actors) == 2
     assert default_jobs([CONFIG] * 9, 16) == 9
     assert default_jobs([CONFIG] * 9, 4) == 4
     assert default_jobs([two] * 9, 16) == 8

@@ -264,12 +264,15 @@ def _interrupt(running: Sequence[Running], progress: Progress) -> None:
 def cores_of(config: Mapping[str, Any]) -> int:
     """Return the number of cores that a run has to itself, at least.
 
-    Its worker processes and its learner take turns, so it is the larger of both. What a run without
-    numbers of its own does is the same on one core, which it uses all the time; on several, its
-    learner and its worker processes wait for each other.
+    Its worker processes and its learner take turns, so it is the larger of both. A run without
+    numbers of its own gives the same results on one core, which it uses all the time; on several,
+    its learner and its worker processes wait for each other. Actors of Ray are as many as groups.
     """
     collect = config["collect"]
-    return int(max(1, (collect["processes"] or 0) * collect["threads"], config["threads"] or 1))
+    processes = collect["processes"]
+    if processes is None:
+        processes = collect["groups"] if collect["engine"] == "ray" else 1
+    return int(max(1, processes * collect["threads"], config["threads"] or 1))
 
 
 def default_jobs(configs: list[Mapping[str, Any]], cores: int) -> int:

@@ -65,10 +65,9 @@ def begin(
     """Take over Bullet's state; the forces of earlier steps are set to 0."""
     for i in range(3):
         state.position[i] = solver.position[i]
-    quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
-    _take_over(solver, state)
-    locate_links(tree, state.rotation, state.angles, links)
-    write_mass_matrix(tree, links, state.centre, state.mass_matrix)
+    for i in range(state.velocity.shape[0]):
+        state.velocity[i] = solver.velocity[i]
+    _take_over_pose(tree, solver, state, links)
     write_bias(tree, links, state.velocity, state.bias)
     forces.scratch[:] = 0.0
     add_product(tree.depths, tree.paths, state.mass_matrix, state.velocity, forces.scratch)
@@ -80,12 +79,15 @@ def begin(
 
 
 @kernel
-def _take_over(solver: SolverState, state: BodyState) -> None:
-    """Copy joint angles and velocities."""
+def _take_over_pose(
+    tree: LinkTree, solver: SolverState, state: BodyState, links: LinkArrays
+) -> None:
+    """Take over Bullet's joint angles and orientation, and write links and masses in that pose."""
+    quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
     for k in range(state.angles.shape[0]):
         state.angles[k] = solver.angles[k]
-    for i in range(state.velocity.shape[0]):
-        state.velocity[i] = solver.velocity[i]
+    locate_links(tree, state.rotation, state.angles, links)
+    write_mass_matrix(tree, links, state.centre, state.mass_matrix)
 
 
 @kernel
@@ -124,35 +126,41 @@ def settle(
         the base differs from Bullet's: `NEW_POSE` or `SETTLED`. Its velocity always differs;
         `solver.changed` has the joints that differ.
     """
-    mass = np.sum(tree.masses)
     write_external_forces(tree, step_s, solver, state, forces)
     if not _add_impulse(step_s, weight, contact, forces, state):
         return UNDECIDED
     solver.changed[:] = False
     write_speeds(tree, step_s, solver, state, forces)
     predict(forces)
-    for i in range(3):  # of the centre of mass
+    mass = np.sum(tree.masses)
+    for i in range(3):  # the new centre of mass, until the new pose is known
         state.position[i] = (
             state.position[i] + state.centre[i] + step_s * state.momentum[3 + i] / mass
         )
-    result = SETTLED
-    if _apply_limits(limits, state.mass_matrix, solver):
+    turned = _apply_limits(limits, state.mass_matrix, solver)
+    if turned:
         _turn_base(tree, state.mass_matrix, forces.matrix, solver)
-        result = NEW_POSE
-    quaternions_to_matrices(solver.quaternion.reshape(1, 4), state.rotation.reshape(1, 3, 3))
-    for k in range(state.angles.shape[0]):
-        state.angles[k] = solver.angles[k]
-    locate_links(tree, state.rotation, state.angles, links)
-    write_mass_matrix(tree, links, state.centre, state.mass_matrix)
+    _take_over_pose(tree, solver, state, links)
+    moved = _place_base(ends, links, solver, state)
+    _write_velocity(tree, state, solver.velocity, forces)
+    write_bias(tree, links, state.velocity, state.bias)
+    return NEW_POSE if turned or moved else SETTLED
+
+
+@kernel
+def _place_base(ends: BoneEnds, links: LinkArrays, solver: SolverState, state: BodyState) -> bool:
+    """Replace `state.position`, the centre of mass, by the position of the base.
+
+    Returns:
+        Whether it differs from Bullet's.
+    """
     for i in range(3):
         state.position[i] -= state.centre[i]
     state.position[2] += excess_m(ends, links, state.position[2])
+    moved = False
     for i in range(3):
-        if abs(state.position[i] - solver.position[i]) > _SAME_PLACE_M:
-            result = NEW_POSE
-    _write_velocity(tree, state, solver.velocity, forces)
-    write_bias(tree, links, state.velocity, state.bias)
-    return result
+        moved = moved or abs(state.position[i] - solver.position[i]) > _SAME_PLACE_M
+    return moved
 
 
 @kernel
