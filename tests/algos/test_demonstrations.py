@@ -10,14 +10,8 @@ from fake_env import FakeEnv
 from refusals import naming
 from tensordict import TensorDict
 
-from veca_marl.algos.demonstrations import (
-    CARD,
-    INDEX,
-    Array,
-    Demonstrations,
-    DemonstrationsError,
-    TeamForm,
-)
+from veca_marl.algos.demonstration_files import CARD, INDEX, Array, DemonstrationsError, TeamForm
+from veca_marl.algos.demonstrations import Demonstrations
 
 FORMS = [{}, {"discrete": True}, {"hybrid": True}, {"agents": 2, "teams": ("red", "blue")}]
 

@@ -9,7 +9,8 @@ from composed import compose
 from demonstrated import record_toy
 from refusals import naming
 
-from veca_marl.algos.demonstrations import Demonstrations, DemonstrationsError
+from veca_marl.algos.demonstration_files import DemonstrationsError
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.demonstrations import main
 from veca_marl.demonstrations.episode_files import Archive
 from veca_marl.demonstrations.export.agent import DemonstratedAgent

@@ -10,7 +10,8 @@ from composed import compose
 from refusals import naming
 from rollouts import game_cfg
 
-from veca_marl.algos.demonstrations import CARD, INDEX, Demonstrations, DemonstrationsError
+from veca_marl.algos.demonstration_files import CARD, INDEX, DemonstrationsError
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.files import WriteError
 from veca_marl.config import ConfigError
 from veca_marl.demonstrations import episode_files, main

@@ -4,7 +4,8 @@ import torch
 from fake_env import FakeEnv
 from torchrl.envs.utils import step_mdp
 
-from veca_marl.algos.demonstrations import Card, Demonstrations, Episode, TeamForm
+from veca_marl.algos.demonstration_files import Card, Episode, TeamForm
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.specs import team_specs
 from veca_marl.demonstrations.episode_files import Archive, EpisodeWriter
 from veca_marl.demonstrations.record import row_arrays, summary

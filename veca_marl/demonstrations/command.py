@@ -27,7 +27,8 @@ import torch
 from omegaconf import MISSING
 
 from veca_marl.algos.checkpoints import CheckpointError
-from veca_marl.algos.demonstrations import Card, Demonstrations, DemonstrationsError
+from veca_marl.algos.demonstration_files import Card, DemonstrationsError
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.files import WriteError
 from veca_marl.config import ConfigError, compose
 from veca_marl.config.command_line import CommandLine, check_folder

@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 from tensordict import MemoryMappedTensor, TensorDict, TensorDictBase
 
-from veca_marl.algos.demonstrations import (
+from veca_marl.algos.demonstration_files import (
     CARD,
     DATA,
     END,

@@ -16,7 +16,7 @@ from torchrl.envs.utils import step_mdp
 from tqdm import tqdm
 
 from veca_marl.algos.collection.experience import start_method
-from veca_marl.algos.demonstrations import (
+from veca_marl.algos.demonstration_files import (
     ACTION,
     END,
     OUTCOME,

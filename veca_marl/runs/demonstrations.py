@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from veca_marl.algos.demonstrations import Demonstrations, DemonstrationsError, TeamForm
+from veca_marl.algos.demonstration_files import DemonstrationsError, TeamForm
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.specs import TeamSpec
 from veca_marl.config import ConfigError
 from veca_marl.envs.core.benchmark import parameters

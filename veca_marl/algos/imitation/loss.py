@@ -18,7 +18,7 @@ from tensordict.nn import CompositeDistribution
 from torch import Tensor
 from torch.distributions import Distribution, Normal
 
-from veca_marl.algos.demonstrations import Key
+from veca_marl.algos.demonstration_files import Key
 from veca_marl.algos.specs import ActionLayout, action_key
 
 LARGEST_ACTION = 0.98

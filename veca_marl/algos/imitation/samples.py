@@ -10,7 +10,8 @@ from tensordict import TensorDict
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
-from veca_marl.algos.demonstrations import Demonstrations, Key
+from veca_marl.algos.demonstration_files import Key
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.networks.memory import initial_states
 from veca_marl.algos.specs import TeamSpec, action_key
 

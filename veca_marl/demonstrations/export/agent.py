@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.algos.demonstrations import Demonstrations, DemonstrationsError, Key
+from veca_marl.algos.demonstration_files import DemonstrationsError, Key
+from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.specs import PLAIN, ActionLayout, ArrayLayout, action_key
 
 Arrays = dict[str, NDArray[Any]]

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.algos.demonstrations import DemonstrationsError
+from veca_marl.algos.demonstration_files import DemonstrationsError
 from veca_marl.algos.files import write_atomically, write_errors
 from veca_marl.algos.specs import PLAIN, ArrayLayout
 from veca_marl.demonstrations.export.agent import AgentEpisode, Arrays, DemonstratedAgent

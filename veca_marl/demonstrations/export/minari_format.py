@@ -12,7 +12,7 @@ from typing import Any
 
 import gymnasium
 
-from veca_marl.algos.demonstrations import DemonstrationsError
+from veca_marl.algos.demonstration_files import DemonstrationsError
 from veca_marl.config import ConfigError
 from veca_marl.demonstrations.export.agent import AgentEpisode, DemonstratedAgent
 

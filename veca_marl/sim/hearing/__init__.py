@@ -11,7 +11,8 @@ from veca_marl.sim.hearing.audio_sense import (
 from veca_marl.sim.hearing.conditioning import condition
 from veca_marl.sim.hearing.hrtf import HrtfTable, kemar_table, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
-from veca_marl.sim.hearing.sofa import SofaError, read_sofa
+from veca_marl.sim.hearing.sofa import read_sofa
+from veca_marl.sim.hearing.sofa_file import SofaError
 from veca_marl.sim.hearing.spatial_audio import get_spatial_audio
 
 __all__ = [

@@ -16,7 +16,7 @@ from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing.head_response import HeadResponse, check_scale
 from veca_marl.sim.hearing.hrtf import kemar_response, kemar_table, sofa_response, sofa_table
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
-from veca_marl.sim.hearing.sofa import check_can_read_sofa
+from veca_marl.sim.hearing.sofa_file import check_can_read_sofa
 from veca_marl.sim.physics import World
 from veca_marl.sim.sense import ArraySpec, Sense
 from veca_marl.sim.sound import NEAR_FIELD_M, SAMPLE_RATE_HZ, Receiver

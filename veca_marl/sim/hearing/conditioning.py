@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.head_response import HeadResponse, minimum_phase
-from veca_marl.sim.hearing.sofa import MeasuredHead, SofaError
+from veca_marl.sim.hearing.sofa import MeasuredHead
+from veca_marl.sim.hearing.sofa_file import SofaError
 from veca_marl.sim.hearing.spherical_head import ear_incidence, sphere_response, woodworth_arrival_s
 from veca_marl.sim.sound import SPEED_OF_SOUND_MPS
 
