@@ -64,6 +64,18 @@ def test_behaviour_cloning_learns_actions_of_every_form(tmp_path, form, memory):
     assert score(learner, **form) > 0.9
 
 
+@pytest.mark.parametrize("form", [{}, {"hybrid": True}], ids=str)
+def test_a_cloned_policy_has_a_scale_to_explore_with(tmp_path, form):
+    learner = make(bc(), **form)
+    learner.take_demonstrations(demonstrations_of_toy(tmp_path, 8, **form))
+    learner.learn(frames(6400))
+    policy = learner.actor.get_dist(FakeEnv(64, seed=3, **form).reset())
+    if form:
+        policy = policy.dists["agents", "action", "move"]
+    assert policy.scale.min() > 0.15
+    assert policy.scale.median() < 0.4
+
+
 def test_agents_may_have_networks_of_their_own(tmp_path):
     learner = make(bc(network=network(parameters=Parameters.separate)), agents=2)
     learner.take_demonstrations(demonstrations_of_toy(tmp_path, 8, agents=2))

@@ -1,5 +1,8 @@
 """The loss of imitation against the distributions themselves."""
 
+import math
+from types import SimpleNamespace
+
 import pytest
 import torch
 from fake_env import FakeEnv
@@ -60,11 +63,17 @@ def test_parts_are_weighted_by_their_dimensions():
     assert number(both.loss) == pytest.approx(mean, abs=1e-4)
 
 
-def test_a_scale_below_the_least_one_has_no_gradient():
-    actions, policy, rows = policy_and_rows()
-    policy.scale.retain_grad()
-    ImitationLoss("agents", actions, 100.0)(policy, rows, everything()).loss.backward()
-    assert not policy.scale.grad.any()
+@pytest.mark.parametrize("error", [0.0, 0.05, 1.0])
+def test_the_best_scale_is_that_of_the_errors_and_the_least_one_together(error):
+    actions, _, rows = policy_and_rows()
+    shown = rows["agents", "action"].clamp(-0.9, 0.9)
+    rows["agents", "action"] = shown
+    best = math.hypot(error, 0.2)
+    for ratio, sign in ((0.1, -1), (0.9, -1), (1.0, 0), (1.1, 1), (10.0, 1)):
+        scale = torch.full_like(shown, ratio * best, requires_grad=True)
+        policy = SimpleNamespace(loc=shown.atanh() + error, scale=scale)
+        ImitationLoss("agents", actions, 0.2)(policy, rows, everything()).loss.backward()
+        assert (scale.grad.abs() < 1e-5).all() if sign == 0 else (sign * scale.grad > 1e-5).all()
 
 
 def test_actions_at_the_ends_of_the_range_have_a_finite_loss():

@@ -1,16 +1,19 @@
 """Snapshots of what Bullet and Python keep apart, refusals, and damaged files."""
 
+import collections
 import io
 import json
+import math
 import zipfile
 
 import numpy as np
 import pytest
 from rollouts import game_cfg
 
+from veca_marl.envs.core.built_objects import BuiltObjects
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.object_states import BuiltObjects, Capture
+from veca_marl.envs.core.object_states import Capture
 from veca_marl.envs.core.snapshot import Snapshot, SnapshotError, Snapshots, restore
 from veca_marl.sim.physics.bullet_state import saved_state, solving_order
 
@@ -271,22 +274,34 @@ def _negative_episode(structure):
     structure["episodes"] = [0, 0, -1]
 
 
-def _other_random(structure):
-    state = ["random", ["dict", [["bit_generator", "seed"]]]]
-    structure["made"] = [state if each[0] == "random" else each for each in structure["made"]]
+def _imported_class(structure):
+    name = "veca_marl.envs.core.snapshot:tempfile._TemporaryFileCloser"
+    structure["made"].append(["object", name, []])
 
 
-def _addresses(structure):
-    view = ["view", ["built", 0], 0, ["|O", [1], [8]], True]
-    structure["made"] = [view for _ in structure["made"]]
+def _imported_function(structure):
+    value = ["named_object", "veca_marl.envs.core.snapshot:os.replace"]
+    structure["made"].append(["list", [value]])
 
 
-def _property(structure):
-    structure["made"] = [["method", ["built", 0], "weights"] for _ in structure["made"]]
+def _function_of_another_part(structure):
+    value = ["named_object", "veca_marl.stored_files:read_bytes"]
+    structure["made"].append(["list", [value]])
 
 
-def _negative_episode(structure):
-    structure["episodes"] = [0, 0, -1]
+def _shadowed_method(structure):
+    (task,) = [c for _, c in structure["built"] if c[0] == "object" and c[1].endswith(f":{TASK}")]
+    structure["made"].append(["method", ["built", 0], "reset"])
+    task[2].append(["terminated", ["made", len(structure["made"]) - 1]])
+
+
+def _class_as_enumeration(structure):
+    structure["made"].append(["list", [["enum", "veca_marl.envs.core.game:Game", "x"]]])
+
+
+def _one_array_twice(structure):
+    array = next(content for _, content in structure["built"] if content[0] == "array")
+    structure["made"].append(array)
 
 
 def _no_digest(structure):
@@ -296,7 +311,9 @@ def _no_digest(structure):
 @pytest.mark.parametrize(
     "change",
     [_no_made, _other_format, _foreign_class, _foreign_function, _numbers_beyond, _wrong_kinds,
-     _no_digest, _other_random, _addresses, _property, _negative_episode],
+     _no_digest, _other_random, _addresses, _property, _negative_episode, _imported_class,
+     _imported_function, _function_of_another_part, _shadowed_method, _class_as_enumeration,
+     _one_array_twice],
 )  # fmt: skip
 def test_altered_files_are_refused_in_one_line(begun, snapshots, tmp_path, change):
     taken(begun, snapshots).save(tmp_path / "a.veca")
@@ -322,8 +339,69 @@ def test_damaged_files_are_refused(begun, snapshots, tmp_path):
         archive.writestr("structure.json", "0" * 10**7)
     with pytest.raises(SnapshotError):
         Snapshot.load(path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("structure.json", "[" * 200_000)
+    with pytest.raises(SnapshotError):
+        Snapshot.load(path)
     with pytest.raises(SnapshotError):
         Snapshot.load(tmp_path / "missing.veca")
+
+
+def test_an_array_that_says_that_it_is_larger_takes_no_memory(begun, snapshots, tmp_path):
+    taken(begun, snapshots).save(tmp_path / "a.veca")
+    header = io.BytesIO()
+    claim = {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+    np.lib.format.write_array_header_1_0(header, claim)
+    with (
+        zipfile.ZipFile(tmp_path / "a.veca") as archive,
+        zipfile.ZipFile(tmp_path / "b.veca", "w") as other,
+    ):
+        for name in archive.namelist():
+            content = header.getvalue() if name == "0.npy" else archive.read(name)
+            other.writestr(name, content)
+    with pytest.raises(SnapshotError):
+        Snapshot.load(tmp_path / "b.veca")
+
+
+def break_simulation(game):
+    """Let the pose of the ball become infinite; the step in which it does ends the episode."""
+    nan = [math.nan] * 3
+    game.world.client.resetBaseVelocity(game.world.prop("ball").body_id, nan, nan)
+    for player in game.actors:
+        player.body.rest()
+    assert game.advance().truncated
+
+
+def test_after_a_broken_simulation_it_continues_as_in_a_new_game():
+    game = Game(game_cfg("KickTheBall"))
+    snapshots = Snapshots(game)
+    game.reset(np.random.default_rng(1))
+    let_pass(game, 3)
+    snapshot = taken(game, snapshots)
+    went_on = let_pass(game, 10)
+    break_simulation(game)
+    with pytest.raises(RuntimeError):
+        taken(game, snapshots)
+    restore(game, snapshot)
+    assert let_pass(game, 10) == went_on
+    game.reset(np.random.default_rng(1))
+    assert let_pass(game, 13)[3:] == went_on
+    break_simulation(game)
+    game.reset(np.random.default_rng(1))
+    let_pass(game, 3)
+    restore(game, snapshot)
+    assert taken(game, snapshots).built == snapshot.built
+    assert let_pass(game, 10) == went_on
+    game.close()
+
+
+@pytest.mark.parametrize("kind", [collections.OrderedDict, collections.Counter])
+def test_mappings_of_other_kinds_are_refused(kind):
+    root = Holder()
+    built = BuiltObjects(root)
+    root.held = kind(a=1)
+    with pytest.raises(SnapshotError):
+        Capture(built, frozenset()).states()
 
 
 def test_one_flipped_bit_is_found(begun, snapshots, tmp_path):

@@ -33,7 +33,7 @@ class Imitated:
     """The loss of a sample, and what is measured.
 
     Attributes:
-        loss: Mean of the negative log-likelihood in nats for each dimension of the action.
+        loss: Mean of the cross entropy in nats for each dimension of the action.
         error: Mean absolute error of the most likely action, of continuous parts; not a number
             without any.
         agreement: Fraction of choices that are the most likely ones; not a number without any.
@@ -47,15 +47,18 @@ class Imitated:
 class ImitationLoss:
     """The negative log-likelihood of demonstrated actions, for actions of any form.
 
-    Of a choice it is the cross entropy. Of a vector it is that of the normal distribution before
-    tanh, with a scale of at least `least_scale`: the scale of a policy that repeats what it was
-    shown would otherwise shrink until nothing can be explored from it, and its gradients
-    grow with the inverse square.
+    Of a choice it is the cross entropy. Of a vector it is the cross entropy of the normal
+    distribution before tanh with a normal distribution about what was demonstrated, of the standard
+    deviation `least_scale`. The scale at which it is least is the root of the mean squared error
+    plus ``least_scale ** 2``: with a single demonstrated value in place of the distribution, the
+    scale of a policy that repeats what it was shown would shrink until nothing can be explored from
+    it, and the gradients would grow with the inverse square.
 
     Args:
         team: Name of the team.
         actions: Part of the action to its layout.
-        least_scale: Lower bound of scales.
+        least_scale: Standard deviation, before tanh, of the distribution about what was
+            demonstrated: the scale of a policy without errors.
         labels: Part of the action to the key of what was demonstrated; None is that of the action.
     """
 
@@ -100,9 +103,10 @@ class ImitationLoss:
 
     def _of_vector(self, policy: Any, shown: Tensor) -> Tensor:
         target = shown.clamp(-LARGEST_ACTION, LARGEST_ACTION).atanh()
-        normal = Normal(policy.loc, policy.scale.clamp_min(self._least), validate_args=False)
-        likelihood: Tensor = normal.log_prob(target)
-        return -likelihood.sum(-1)
+        normal = Normal(policy.loc, policy.scale, validate_args=False)
+        spread = 0.5 * (self._least / policy.scale) ** 2
+        entropy: Tensor = spread - normal.log_prob(target)
+        return entropy.sum(-1)
 
 
 def _mean(values: Tensor, counted: Tensor) -> Tensor:

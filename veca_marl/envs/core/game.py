@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.core.built_objects import BuiltObjects
 from veca_marl.envs.core.expert import Expert, check_expert, find_expert
 from veca_marl.envs.core.game_cfg import GameCfg, Script
-from veca_marl.envs.core.object_states import BuiltObjects
 from veca_marl.envs.core.task import Player, Team, find_task
 from veca_marl.sim.body import make_body
 from veca_marl.sim.physics import World
@@ -224,10 +224,9 @@ class Game:
         Args:
             rng: Generator of this episode: its start, its steps and its scripted players.
         """
+        if self.broken:
+            self.rebuild()
         self._rng = rng
-        if self._broken():
-            self.world.close()
-            self._build()
         self.steps = 0
         self.eliminated = frozenset()
         self.world.reset(rng)
@@ -294,7 +293,7 @@ class Game:
         self.task.before_step(rng)
         self.world.step()
         self.steps += 1
-        if broken := self._broken():
+        if broken := self.broken:
             return self._broken_outcome(broken)
         self.task.after_step(rng)
         terms = {player.name: self._terms(player) for player in self.players}
@@ -311,8 +310,20 @@ class Game:
     def _body_info(self) -> dict[str, dict[str, float]]:
         return {player.name: player.body.info() for player in self.players}
 
-    def _broken(self) -> list[str]:
-        """Return the names of bodies and props whose state is not finite any more."""
+    def rebuild(self) -> None:
+        """Build everything anew, as a new game does: no episode has begun then."""
+        self.world.close()
+        cfg = self.cfg
+        vars(self).clear()
+        Game.__init__(self, cfg)
+
+    @property
+    def broken(self) -> list[str]:
+        """Names of the bodies and props whose state is not finite any more.
+
+        Bullet does not recover from that, whatever is restored: `reset` and `Restoring` build
+        everything anew.
+        """
         bodies = [player.name for player in self.players if not player.body.is_finite]
         return bodies + self.world.broken_props
 

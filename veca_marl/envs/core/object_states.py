@@ -7,113 +7,40 @@ objects that were made since then, in terms of numbers, text, arrays and referen
 was built keeps its identity, and what was made since is made again.
 
 Nothing is executed when a state is put back: objects are made without their constructors, of
-classes in packages that the game itself uses. What is no data (a generator function that runs, an
-iterator, an open file) is refused when a state is captured.
+classes in packages that the game itself uses, and no attribute takes the place of a method. What is
+no data (a generator function that runs, an iterator, an open file) is refused when a state is
+captured.
 """
 
 from __future__ import annotations
 
 import functools
-import logging
-import sys
+import inspect
 import types
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
-from veca_marl.sim.physics.bullet_client import BulletClient
+from veca_marl.envs.core.built_objects import (
+    ATOMS,
+    OPAQUE,
+    PLAIN,
+    BuiltObjects,
+    KnownNames,
+    SnapshotError,
+    attributes,
+    name_of,
+    parts_of,
+)
 
 Value = Any
 """None, bool, int, float, str, or a tuple that begins with the kind of what it stands for."""
 
-_PLAIN = (type(None), bool, int, float, str)
-# have no content of their own
-_ATOMS = (bytes, Enum, range, slice, np.generic, np.dtype)
-# have a content that is captured elsewhere, or none that changes: only those that were built
-_OPAQUE: tuple[type, ...] = (
-    BulletClient, logging.Logger, type, types.FunctionType, types.BuiltinFunctionType,
-    types.ModuleType, functools.partial,
-)  # fmt: skip
 _IMMUTABLE = (tuple, frozenset, types.MethodType, types.MappingProxyType)
-
-
-class SnapshotError(ValueError):
-    """A state cannot be captured, stored, read or put back; the message is one line."""
-
-
-class BuiltObjects:
-    """All objects that can be reached from a root, in a fixed order.
-
-    Args:
-        root: The object from which the walk begins.
-
-    Attributes:
-        objects: The root, and the others in the order in which they were found.
-    """
-
-    def __init__(self, root: object) -> None:
-        # with itself, since the root may have it as an attribute
-        self.objects = [*_reachable(root), self]
-        self._numbers = {id(each): number for number, each in enumerate(self.objects)}
-
-    def number(self, item: object) -> int | None:
-        """Return the number of an object; None if it is not one of these."""
-        return self._numbers.get(id(item))
-
-    def shared_with(self, other: BuiltObjects) -> frozenset[int]:
-        """Return the numbers of the objects that two games of one configuration have in common.
-
-        These are constants: games do not influence each other.
-
-        Raises:
-            SnapshotError: If the two were not built alike.
-        """
-        kinds = [[type(each) for each in one.objects] for one in (self, other)]
-        if kinds[0] != kinds[1]:
-            raise SnapshotError("two games of one configuration were not built alike")
-        pairs = enumerate(zip(self.objects, other.objects, strict=True))
-        return frozenset(number for number, (one, two) in pairs if one is two)
-
-
-def _reachable(root: object) -> Iterator[object]:
-    """Yield all objects that have a content, each once, breadth first."""
-    found, waiting = {id(root)}, deque([root])
-    while waiting:
-        item = waiting.popleft()
-        yield item
-        for part in _parts(item):
-            if not isinstance(part, (*_PLAIN, *_ATOMS)) and id(part) not in found:
-                found.add(id(part))
-                waiting.append(part)
-
-
-def _parts(item: Any) -> Iterable[object]:
-    """Return the objects that an object consists of."""
-    if isinstance(item, (*_OPAQUE, BuiltObjects, np.random.Generator)):
-        return []
-    if isinstance(item, np.ndarray):
-        return [item.base] if isinstance(item.base, np.ndarray) else []
-    if isinstance(item, Mapping):
-        return [part for pair in item.items() for part in pair]
-    if isinstance(item, (list, tuple, set, frozenset, deque)):
-        return item
-    if isinstance(item, types.MethodType):
-        return [item.__self__]
-    return [value for _, value in attributes(item)]
-
-
-def attributes(item: object) -> Iterator[tuple[str, object]]:
-    """Yield the names and values of all attributes of an object, with those in slots."""
-    yield from getattr(item, "__dict__", {}).items()
-    for one in type(item).__mro__:
-        slots = one.__dict__.get("__slots__", ())
-        for name in (slots,) if isinstance(slots, str) else slots:
-            if name not in ("__dict__", "__weakref__") and hasattr(item, name):
-                yield name, getattr(item, name)
 
 
 @dataclass
@@ -139,6 +66,7 @@ class Capture:
 
     def __init__(self, built: BuiltObjects, constant: frozenset[int]) -> None:
         self._built, self._constant = built, constant
+        self._names = KnownNames(built)
         self._made: dict[int, int] = {}
         self._kept: list[object] = []  # an identity is that of another object after it is freed
         self._waiting: deque[tuple[bool, int, object]] = deque()
@@ -163,7 +91,7 @@ class Capture:
 
     def _value(self, item: Any, owner: str) -> Value:
         """Return what stands for an object; its content is captured later."""
-        if type(item) in _PLAIN:
+        if type(item) in PLAIN:
             return item
         number = self._built.number(item)
         if number is not None:
@@ -171,10 +99,10 @@ class Capture:
                 self._seen.add(number)
                 self._wait_for(number, item)
             return "built", number
-        if isinstance(item, (*_ATOMS, *_OPAQUE)):
-            return _atom(item, owner)
+        if isinstance(item, (*ATOMS, *OPAQUE)):
+            return self._atom(item, owner)
         if id(item) not in self._made:
-            _check_is_data(item, owner)
+            self._check_is_data(item, owner)
             self._made[id(item)] = len(self._kept)
             self._waiting.append((False, len(self._kept), item))
             self._kept.append(item)
@@ -184,8 +112,8 @@ class Capture:
     def _wait_for(self, number: int, item: Any) -> None:
         """Capture the content of a built object later; that of what cannot change is in parts."""
         if isinstance(item, _IMMUTABLE):
-            self._values(_parts(item), _class_name(item))
-        elif not isinstance(item, (*_OPAQUE, BuiltObjects)):
+            self._values(parts_of(item), _class_name(item))
+        elif not isinstance(item, (*OPAQUE, BuiltObjects)):
             self._waiting.append((True, number, item))
 
     def _values(self, items: Iterable[Any], owner: str) -> tuple[Value, ...]:
@@ -209,9 +137,9 @@ class Capture:
         if kind is np.random.Generator:
             return "random", _frozen(item.bit_generator.state)
         if isinstance(item, tuple):
-            return "named", _name_of(kind), self._values(item, name)
+            return "named", name_of(kind), self._values(item, name)
         held = ((key, self._value(value, f"{name}.{key}")) for key, value in attributes(item))
-        return "object", _name_of(kind), tuple(held)
+        return "object", name_of(kind), tuple(held)
 
     def _array(self, item: np.ndarray[Any, Any]) -> Value:
         if item.dtype.hasobject:
@@ -223,36 +151,54 @@ class Capture:
             return "view", base, offset, shape, item.flags.writeable
         return "array", item.copy(), item.flags.writeable
 
+    def _atom(self, item: Any, owner: str) -> Value:
+        """Return what stands for an object without a content of its own."""
+        if isinstance(item, Enum):
+            return "enum", self._known_name(type(item), owner), item.name
+        if isinstance(item, np.generic):
+            return "scalar", item.dtype.str, item.item()
+        if isinstance(item, np.dtype):
+            return "dtype", item.str
+        if isinstance(item, bytes):
+            return "bytes", item.hex()
+        if isinstance(item, (range, slice)):
+            return type(item).__name__, item.start, item.stop, item.step
+        if isinstance(item, type) and issubclass(item, np.generic):
+            return "number_type", np.dtype(item).str
+        if isinstance(item, (type, types.FunctionType)):
+            return "named_object", self._known_name(item, owner)
+        raise _no_data(item, owner)
+
+    def _known_name(self, item: type | types.FunctionType, owner: str) -> str:
+        """Return the name by which a class or function can be found again."""
+        name = name_of(item)
+        try:
+            if self._names.find(name) is item:
+                return name
+        except SnapshotError as error:
+            raise _no_data(item, owner) from error
+        raise _no_data(item, owner)
+
+    def _check_is_data(self, item: Any, owner: str) -> None:
+        """Refuse objects whose content is not in their attributes, such as files and iterators."""
+        kind = type(item)
+        if kind in _WITH_CONTENT:
+            return
+        if isinstance(item, (dict, list, set, frozenset, deque, np.ndarray)):
+            raise _no_data(item, owner)  # a kind of its own, whose items are not attributes
+        try:
+            object.__new__(kind) if not isinstance(item, tuple) else None
+        except TypeError:
+            raise _no_data(item, owner) from None
+        self._known_name(kind, owner)
+
+
+def _no_data(item: object, owner: str) -> SnapshotError:
+    return SnapshotError(f"{owner} holds {item!r:.80}, which is no data")
+
 
 def _class_name(item: object) -> str:
     return type(item).__name__
-
-
-def _atom(item: Any, owner: str) -> Value:
-    """Return what stands for an object without a content of its own."""
-    if isinstance(item, Enum):
-        return "enum", _name_of(type(item)), item.name
-    if isinstance(item, np.generic):
-        return "scalar", item.dtype.str, item.item()
-    if isinstance(item, np.dtype):
-        return "dtype", item.str
-    if isinstance(item, bytes):
-        return "bytes", item.hex()
-    if isinstance(item, (range, slice)):
-        return type(item).__name__, item.start, item.stop, item.step
-    if isinstance(item, (type, types.FunctionType)) and _found(_name_of(item)) is item:
-        return "named_object", _name_of(item)
-    raise SnapshotError(f"{owner} holds {item!r:.80}, which is no data")
-
-
-def _check_is_data(item: Any, owner: str) -> None:
-    """Refuse objects whose content is not in their attributes, such as files and iterators."""
-    if isinstance(item, (np.ndarray, Mapping, list, set, deque, np.random.Generator, *_IMMUTABLE)):
-        return
-    try:
-        object.__new__(type(item))
-    except TypeError:
-        raise SnapshotError(f"{owner} holds {item!r:.80}, which is no data") from None
 
 
 def _frozen(state: Any) -> Value:
@@ -278,19 +224,6 @@ def _bit_generator(state: Any) -> np.random.BitGenerator:
     return generator
 
 
-def _name_of(item: Any) -> str:
-    return f"{item.__module__}:{item.__qualname__}"
-
-
-def _found(name: str) -> Any:
-    """Return what is called `module:name` in the modules that are imported; None if nothing is."""
-    module, _, path = name.partition(":")
-    found: Any = sys.modules.get(module)
-    for part in path.split("."):
-        found = getattr(found, part, None)
-    return found
-
-
 _CONTAINERS: dict[str, Callable[[Iterable[Any]], Any]] = {
     "list": list, "set": set, "tuple": tuple, "frozenset": frozenset,
 }  # fmt: skip
@@ -311,8 +244,7 @@ class Putting:
     def __init__(self, states: ObjectStates, built: BuiltObjects) -> None:
         self._states, self._built = states, built
         self._made: dict[int, Any] = {}
-        packages = {type(each).__module__.partition(".")[0] for each in built.objects}
-        self._packages = packages - {"builtins", "collections", "functools", "numpy"}
+        self._names = KnownNames(built)
         try:
             made = [(self._object(number), each) for number, each in enumerate(states.made)]
             present = [(built.objects[number], each) for number, each in states.built.items()]
@@ -340,16 +272,16 @@ class Putting:
     def _new(self, content: Value) -> Any:
         kind = content[0]
         if kind == "object":
-            return object.__new__(self._class(content[1]))
+            return object.__new__(self._names.find_class(content[1]))
         if kind in ("tuple", "frozenset"):
             return _CONTAINERS[kind](self._value(each) for each in content[1])
         if kind == "named":
-            return tuple.__new__(self._class(content[1]), map(self._value, content[2]))
+            return tuple.__new__(self._names.find_class(content[1]), map(self._value, content[2]))
         if kind == "proxy":
             pairs = (map(self._value, pair) for pair in content[1])
             return types.MappingProxyType(dict(pairs))  # type: ignore[arg-type]
         if kind == "method":
-            return self._method(self._value(content[1]), content[2])
+            return self._names.method(self._value(content[1]), content[2])
         if kind == "array":
             array = content[1].copy()
             array.flags.writeable = content[2]
@@ -361,13 +293,6 @@ class Putting:
         if kind == "deque":
             return deque(maxlen=content[1])
         return {"list": list, "dict": dict, "set": set}[kind]()
-
-    def _method(self, owner: Any, name: str) -> Any:
-        """Return a method; what is no method, such as a property, is not called."""
-        function = getattr(type(owner), name)
-        if not isinstance(function, types.FunctionType):
-            raise SnapshotError(f"{type(owner).__name__}.{name} is no method")
-        return types.MethodType(function, owner)
 
     def _view(self, content: Value) -> Any:
         _, base, offset, (dtype, shape, strides), writeable = content
@@ -390,8 +315,9 @@ class Putting:
             _check_kind(item.bit_generator, type(_bit_generator(state)))
             return lambda: setattr(item.bit_generator, "state", state)
         if kind == "object":
-            _check_kind(item, self._class(content[1]))
+            _check_kind(item, self._names.find_class(content[1]))
             values = {str(name): self._value(value) for name, value in content[2]}
+            _check_attributes(type(item), values)
             return lambda: _set_attributes(item, values)
         _check_kind(item, {"list": list, "dict": dict, "set": set, "deque": deque}[kind])
         if kind == "dict":
@@ -420,33 +346,31 @@ class Putting:
         if kind == "made":
             return self._object(value[1])
         if kind == "enum":
-            return self._class(value[1])[value[2]]
+            return self._member(value[1], value[2])
         if kind == "scalar":
             return np.dtype(value[1]).type(value[2])
         if kind == "bytes":
             return bytes.fromhex(value[1])
         if kind == "named_object":
-            return self._known(value[1])
+            return self._names.find(value[1])
+        if kind == "number_type":
+            return np.dtype(value[1]).type
         if kind == "dtype":
             return np.dtype(value[1])
         return {"range": range, "slice": slice}[kind](*value[1:])
 
-    def _class(self, name: str) -> Any:
-        found = self._known(name)
-        if not isinstance(found, type):
-            raise SnapshotError(f"{name} is no class")
-        return found
-
-    def _known(self, name: str) -> Any:
-        """Return a class or function of one of the packages of the game."""
-        found = _found(name)
-        is_known = name.partition(":")[0].partition(".")[0] in self._packages
-        is_known |= isinstance(found, type) and issubclass(found, np.generic)
-        if not is_known or not isinstance(found, (type, types.FunctionType)):
-            raise SnapshotError(f"{name} is no class or function of {sorted(self._packages)}")
-        return found
+    def _member(self, name: str, member: str) -> Enum:
+        """Return a member of an enumeration."""
+        found = self._names.find_class(name)
+        if not issubclass(found, Enum):
+            raise SnapshotError(f"{name} is no enumeration")
+        return found[member]
 
 
+_WITH_CONTENT = {
+    np.ndarray, np.random.Generator, dict, deque, types.MappingProxyType, types.MethodType,
+    *_CONTAINERS.values(),
+}  # fmt: skip
 _FILLED_AT_ONCE = ("array", "view", "tuple", "frozenset", "named", "proxy", "method")
 
 
@@ -458,6 +382,15 @@ def _check_kind(item: object, kind: type) -> None:
 def _refill(item: Any, add: Callable[[Any], None], parts: Any) -> None:
     item.clear()
     add(parts)
+
+
+def _check_attributes(kind: type, names: Iterable[str]) -> None:
+    """Refuse attributes that would take the place of what a class defines, such as a method."""
+    for name in names:
+        defined = inspect.getattr_static(kind, name, None)
+        is_data = isinstance(defined, (types.MemberDescriptorType, functools.cached_property))
+        if not is_data and (callable(defined) or hasattr(defined, "__get__")):
+            raise SnapshotError(f"the snapshot has an attribute for {kind.__name__}.{name}")
 
 
 def _set_attributes(item: object, values: Mapping[str, Any]) -> None:

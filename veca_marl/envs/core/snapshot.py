@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import os
 import tempfile
 import zipfile
@@ -16,21 +17,17 @@ from typing import Any
 
 import numpy as np
 
+from veca_marl.envs.core.built_objects import BuiltObjects, SnapshotError
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
-from veca_marl.envs.core.object_states import (
-    BuiltObjects,
-    Capture,
-    ObjectStates,
-    Putting,
-    SnapshotError,
-)
+from veca_marl.envs.core.object_states import Capture, ObjectStates, Putting
 from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.physics.world import SavedPhysics
 from veca_marl.stored_files import StoredFileError, read_bytes
 
 _FORMAT = 1
 _LARGEST = 500_000_000  # bytes of a file; a game of two full bodies has about 3 MB
+_LARGEST_STRUCTURE = 50_000_000
 _STRUCTURE, _PHYSICS = "structure.json", "physics.bullet"
 
 
@@ -109,11 +106,13 @@ class Snapshots:
             episodes: `Episodes.state` of its world.
 
         Raises:
-            RuntimeError: If no episode has begun.
+            RuntimeError: If no episode has begun, or the simulation is not finite any more.
             SnapshotError: If an object of the game is no data, such as a generator that runs.
         """
         if not game.has_begun:
             raise RuntimeError("no episode has begun: call reset() before snapshot()")
+        if game.broken:
+            raise RuntimeError("the simulation is not finite any more: call reset()")
         states = Capture(game.built, self._constant).states()
         physics = game.world.save_physics()
         return Snapshot(game.cfg.task.name, _digest(game), states, physics, episodes)
@@ -121,6 +120,8 @@ class Snapshots:
 
 class Restoring:
     """A snapshot that was checked against the game that it is to be restored in.
+
+    A game whose simulation is not finite any more is built anew first.
 
     Args:
         game: The game.
@@ -139,6 +140,8 @@ class Restoring:
             raise SnapshotError(
                 f"the snapshot is of {snapshot.task}, the game is {game.cfg.task.name}"
             )
+        if game.broken:
+            game.rebuild()
         if snapshot.built != _digest(game):
             raise SnapshotError(
                 f"the snapshot of {snapshot.task} is of another configuration, or of another "
@@ -214,17 +217,24 @@ def _array_name(number: int) -> str:
 
 
 def _read(archive: zipfile.ZipFile) -> Snapshot:
-    if any(each.file_size != each.compress_size for each in archive.infolist()):
+    entries = archive.infolist()
+    if any(each.file_size != each.compress_size for each in entries):
         raise SnapshotError("it is compressed, which snapshots are not")
+    if sum(each.file_size for each in entries) > _LARGEST:
+        raise SnapshotError(f"its parts have more than {_LARGEST} bytes")
+    if archive.getinfo(_STRUCTURE).file_size > _LARGEST_STRUCTURE:
+        raise SnapshotError(f"{_STRUCTURE} has more than {_LARGEST_STRUCTURE} bytes")
     structure = json.loads(archive.read(_STRUCTURE))
     if structure["format"] != _FORMAT:
         raise SnapshotError(f"it has the format {structure['format']}, not {_FORMAT}")
+    names = {_array_name(number) for number in range(len(entries))} & set(archive.namelist())
 
     def with_array(content: Any) -> Any:
         if content[0] != "array":
             return content
-        buffer = io.BytesIO(archive.read(_array_name(content[1])))
-        return "array", np.lib.format.read_array(buffer, allow_pickle=False), content[2]
+        name = _array_name(content[1])
+        names.remove(name)  # each is the content of one object
+        return "array", _array(archive.read(name)), content[2]
 
     states = ObjectStates(
         {int(number): with_array(each) for number, each in structure["built"]},
@@ -237,12 +247,27 @@ def _read(archive: zipfile.ZipFile) -> Snapshot:
     return Snapshot(task, digest, states, physics, (seed, world, number))
 
 
+def _array(content: bytes) -> np.ndarray[Any, Any]:
+    """Return an array in NumPy's format, of which nothing is allocated but what is there."""
+    buffer = io.BytesIO(content)
+    if np.lib.format.read_magic(buffer) != (1, 0):
+        raise SnapshotError("an array is of another version of NumPy's format")
+    shape, by_columns, dtype = np.lib.format.read_array_header_1_0(buffer)
+    present = len(content) - buffer.tell()
+    if dtype.hasobject or math.prod(shape) * dtype.itemsize != present:
+        raise SnapshotError(f"an array {dtype}{shape} has {present} bytes")
+    flat = np.frombuffer(content, dtype, math.prod(shape), buffer.tell())
+    return flat.reshape(shape, order="F" if by_columns else "C").copy(order="K")
+
+
 @contextmanager
 def _damage(path: Path) -> Iterator[None]:
     """Turn the errors of a damaged file into one line that names it."""
     try:
         yield
-    except (zipfile.BadZipFile, LookupError, TypeError, ValueError, EOFError, OSError) as error:
+    except (
+        zipfile.BadZipFile, LookupError, TypeError, ValueError, EOFError, OSError, RuntimeError,
+    ) as error:  # fmt: skip
         reason = " ".join(str(error).split())
         raise SnapshotError(f"{path} is no snapshot, or damaged: {reason}") from error
 
