@@ -203,6 +203,28 @@ def test_a_policy_that_is_too_large_is_not_written(run, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_an_entry_that_exists_is_kept(run, stored, tmp_path):
+    before = stored.read_bytes()
+    with pytest.raises(ConfigError, match=naming("Tiny")):
+        add(AddOptions(str(run), "Tiny", str(stored.parent), episodes=1))
+    assert stored.read_bytes() == before
+    with pytest.raises(ConfigError):  # found only when its episodes are to be played
+        add(AddOptions(str(run), "Other", str(tmp_path), episodes=1), ["task.nonsense=1"])
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_are_no_paths(run, tmp_path, monkeypatch, capsys):
+    for words in (["name=../x"], ["name=/tmp/x"], ["episodes=0"]):
+        assert main(["add", f"run={run}", f"to={tmp_path / 'zoo'}", *words]) == 2
+        assert words[0].partition("=")[2] in capsys.readouterr().err
+    content = read_checkpoint(checkpoints_in(run / "checkpoints")[-1], torch.device("cpu"))
+    hostile = {**content, "identity": {**content["identity"], "task": str(tmp_path / "victim")}}
+    monkeypatch.setattr("veca_marl.zoo.command.read_checkpoint", lambda *_: hostile)
+    with pytest.raises(ConfigError, match="victim"):
+        add(AddOptions(str(run), None, str(tmp_path / "zoo"), episodes=1))
+    assert not list(tmp_path.iterdir())
+
+
 def test_every_policy_of_this_package_fits_its_game_and_has_been_evaluated():
     for entry in entries():
         policy = load(entry.name)

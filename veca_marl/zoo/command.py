@@ -8,7 +8,9 @@ with the default parameters of the task.
 
 from __future__ import annotations
 
+import re
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +35,7 @@ from veca_marl.zoo.entries import Entry, entries
 
 _ERRORS = (CheckpointError, WriteError)
 _POLICIES = Path(__file__).parent / "policies"
+_NAME = re.compile(r"\w[\w.-]{0,99}")
 
 
 @dataclass
@@ -56,6 +59,11 @@ class AddOptions:
     to: str | None = None
     episodes: int | str = BENCHMARK
 
+    def __post_init__(self) -> None:
+        EvaluateOptions(episodes=self.episodes)
+        if self.name is not None and not _NAME.fullmatch(self.name):
+            raise ValueError(f"name={self.name} must be letters, digits, '_', '-' and '.' only")
+
 
 def add(options: AddOptions, overrides: Sequence[str] = ()) -> Path:
     """Make a file of a run's policy, evaluate it and store the result in it.
@@ -69,13 +77,13 @@ def add(options: AddOptions, overrides: Sequence[str] = ()) -> Path:
 
     Raises:
         CheckpointError: If there is no checkpoint, or it is too large.
-        ConfigError: If there is no run, or its game is not that of the frozen episodes.
+        ConfigError: If there is no run, its game is not that of the frozen episodes, or there is
+            an entry of the name.
     """
     checkpoint = _checkpoint(Path(options.run))
     folder = open_run(checkpoint.parent.parent, "run=")
     content = read_checkpoint(checkpoint, torch.device("cpu"))
-    name = options.name or str(content["identity"]["task"])
-    path = check_folder(options.to or _POLICIES, "to") / f"{name}{SUFFIX}"
+    path = _new_entry(options, str(content["identity"]["task"]))
     provenance = read_json(folder.provenance)
     about: dict[str, Any] = {
         "config": read_yaml(folder.config),
@@ -88,17 +96,15 @@ def add(options: AddOptions, overrides: Sequence[str] = ()) -> Path:
         "frames": _frames(checkpoint, content),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_policy(path, content, about)
-    try:  # as it is stored: rounding could change an action
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as draft:
+        stored = Path(draft, path.name)
+        write_policy(stored, content, about)  # played as it is stored: rounding could change it
         if options.episodes == BENCHMARK:
-            cfg = stored_configuration(path, overrides, "run=")
+            cfg = stored_configuration(stored, overrides, "run=")
             overrides = [*default_task(cfg.task), *overrides]
         evaluated = evaluate_run(
-            EvaluateOptions(run=str(path), episodes=options.episodes), overrides
+            EvaluateOptions(run=str(stored), episodes=options.episodes), overrides
         )
-    except BaseException:
-        path.unlink()
-        raise
     about["evaluation"] = _plain(summary(evaluated.table))
     if evaluated.benchmark is not None:
         about["benchmark"] = {
@@ -106,6 +112,17 @@ def add(options: AddOptions, overrides: Sequence[str] = ()) -> Path:
             "game": departures(evaluated.game),
         }
     write_policy(path, content, about)
+    return path
+
+
+def _new_entry(options: AddOptions, task: str) -> Path:
+    """Return the path of the file; what a stored checkpoint says of its task is no path."""
+    name = options.name or task
+    if not _NAME.fullmatch(name):
+        raise ConfigError(f"run={options.run} is of a task {task!r:.80}: choose a name=")
+    path = check_folder(options.to or _POLICIES, "to") / f"{name}{SUFFIX}"
+    if path.exists():
+        raise ConfigError(f"{path} exists: remove it first, or choose another name=")
     return path
 
 

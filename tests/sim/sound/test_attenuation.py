@@ -184,6 +184,50 @@ def test_a_door_that_opens_over_a_second_changes_no_step_by_more_than_3_db(line)
     assert energies[-1].min() > 5.0 * energies[0].max()
 
 
+def two_doors(one, other):
+    """A wall with two doors, 3 m apart, the leaves turned by two angles."""
+    pieces = [
+        ((0.0, -2.75, 1.3), (0.05, 0.25, 1.3)),
+        ((0.0, -0.5, 1.3), (0.05, 1.0, 1.3)),
+        ((0.0, 2.25, 1.3), (0.05, 0.75, 1.3)),
+        ((0.0, -2.0, 2.3), (0.05, 0.5, 0.3)),
+        ((0.0, 1.0, 2.3), (0.05, 0.5, 0.3)),
+    ]
+    built = house(pieces)
+    for number, (y, angle) in enumerate(((-2.0, one), (1.0, other))):
+        built.obstacles.add_leaf(LEAF)
+        built.obstacles.move_opening(number, (0.0, y, CLOSED[2]), np.eye(3))
+        hinge = np.array([0.0, y - 0.49, 1.0])
+        centre = hinge + turned(angle) @ (0.0, 0.49, 0.0)
+        built.obstacles.move_leaf(number, centre, turned(angle))
+    return built
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.3, 0.81, np.pi / 2])
+def test_a_door_beside_a_path_takes_nothing_from_what_passes_an_open_one(beside):
+    source, head = (-1.5, -2.0, 1.0), (1.5, -2.0, 1.0)
+    alone, both = two_doors(np.pi / 2, np.pi / 2), two_doors(np.pi / 2, beside)
+    assert (loss_db(both, source, head) - loss_db(alone, source, head) < 1.0).all()
+    closed = two_doors(0.0, np.pi / 2)
+    assert loss_db(closed, source, head)[AT_500_HZ] > 20.0
+
+
+def test_of_two_doors_each_changes_the_level_as_alone():
+    source, head = (-1.5, -2.0, 1.0), (1.5, -2.0, 1.0)
+    for other in (0.0, 0.3, 0.5, np.pi / 2):
+        levels = [loss_db(two_doors(a, other), source, head) for a in np.linspace(0, 1.57, 60)]
+        assert np.abs(np.diff(levels, axis=0)).max() < 3.0
+        assert levels[0][AT_500_HZ] - levels[-1][AT_500_HZ] > 20.0
+
+
+@pytest.mark.parametrize("aside_m", [0.05, 0.1, 0.2, -0.1, -0.2])
+def test_furniture_at_a_wall_takes_nothing_from_a_path_metres_beside_it(aside_m):
+    for side in (1.0, -1.0):
+        rooms = one_room(((side * 2.0, 2.7, 1.0), (0.3, 0.3, 1.0)))  # its back touches the wall
+        source, head = (side * -1.0, -2.0, 1.2), (side * -1.0 + aside_m, 2.6, 1.2)
+        assert loss_db(rooms, source, head).max() < 1.0
+
+
 def total_db(rooms, source, head):
     """Level of the energy of all paths, the mean over the octave bands."""
     arrivals = rooms.arrivals(source, Pose(head, np.eye(3)))

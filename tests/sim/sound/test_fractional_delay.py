@@ -55,6 +55,15 @@ def test_read_at_a_constant_delay(delay):
     assert ratio_db(tone(np.arange(800, 1000) - delay - HALF_WIDTH), found) > 85.0
 
 
+@pytest.mark.parametrize("direction", [-1.0, 1.0])
+@pytest.mark.parametrize("delay", [1e-3, 0.3, 3.7, 40.2])
+def test_a_delay_that_changes_by_one_rounding_is_read_as_a_constant_one(delay, direction):
+    memory = memory_of(tone(np.arange(6000)), 5500)
+    constant = read(memory, delay, delay, 4410)
+    changing = read(memory, delay, np.nextafter(delay, direction * np.inf), 4410)
+    np.testing.assert_allclose(changing, constant, atol=1e-5)
+
+
 @pytest.mark.parametrize(("before", "after"), [(100.0, 90.5), (20.0, 33.3), (40.0, 40.0 + 1e-9)])
 def test_read_at_a_changing_delay(before, after):
     found = read(memory_of(tone(np.arange(1000))), before, after)

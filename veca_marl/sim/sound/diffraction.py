@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS, energy_through
-from veca_marl.sim.sound.silhouettes import BOX, LEAF, MOST_SETS, Screens, Work
+from veca_marl.sim.sound.silhouettes import BOX, LEAF, MOST_MOVING, MOST_SETS, Screens, Work
 
 NEGLIGIBLE = 0.05
 """An obstacle that takes less than this fraction of the energy takes none (0.2 dB); the rest is
@@ -47,7 +47,9 @@ def energy_past(
 
     A closed leaf and the wall round it are one screen. An open leaf stands apart from its opening:
     sound passes both one after another. Between these the level changes linearly with the openness
-    of the leaf: the channel that a leaf opens at its frame is no straight way through it.
+    of the leaf: the channel that a leaf opens at its frame is no straight way through it. Where
+    there are several, the level is linear in the openness of each: the mean over all combinations
+    of closed and open ones, each with its share.
 
     Args:
         count: How many silhouettes there are.
@@ -57,22 +59,18 @@ def energy_past(
         energy: ``(N_BANDS,)``, overwritten.
     """
     count = _keep_those_that_matter(count, work)
-    openness = -1.0
-    for m in range(count):
-        if screens.kinds[work.numbers[m]] != BOX:
-            each = screens.opens[work.numbers[m]]
-            openness = each if openness < 0.0 else min(openness, each)
     energy[:] = 1.0
     if count == 0:
         return
-    if openness <= 0.0:
-        _write_composite(_choose(count, LEAF, False, screens, work), screens, surface_ratio, work)
-        for band in range(N_BANDS):
-            energy[band] = work.part[0, band]
-        return
-    _write_composite(_choose(count, BOX, True, screens, work), screens, surface_ratio, work)
-    for band in range(N_BANDS):
-        energy[band] = work.part[0, band]
+    n_moving = _find_moving(count, screens, work)
+    for combination in range(1 << n_moving):
+        share = 1.0
+        for k in range(n_moving):
+            opens = screens.opens[work.moving[k]]
+            share *= 1.0 - opens if (combination >> k) & 1 else opens
+        n_chosen = _choose_closed(count, n_moving, combination, screens, work)
+        _write_composite(n_chosen, screens, surface_ratio, work)
+        _multiply(energy, share, work)
     for m in range(count):
         number = work.numbers[m]
         if screens.kinds[number] == LEAF and not _contains(work.numbers, m, number):
@@ -81,13 +79,66 @@ def energy_past(
                 if work.numbers[other] == number:
                     work.chosen[n_chosen] = other
                     n_chosen += 1
-            _write_composite(n_chosen, screens, surface_ratio, work)
-            for band in range(N_BANDS):
-                energy[band] *= work.part[0, band]
-    if openness < 1.0:
-        _write_composite(_choose(count, LEAF, False, screens, work), screens, surface_ratio, work)
-        for band in range(N_BANDS):
-            energy[band] = energy[band] ** openness * work.part[0, band] ** (1.0 - openness)
+            if screens.opens[number] > 0.0:
+                _write_composite(n_chosen, screens, surface_ratio, work)
+                _multiply(energy, screens.opens[number], work)
+
+
+@kernel
+def _find_moving(count: int, screens: Screens, work: Work) -> int:
+    """Write the leaves among the silhouettes that are neither open nor closed; return how many."""
+    n_moving = 0
+    for m in range(count):
+        number = work.numbers[m]
+        is_known = _index_of_leaf(screens.leaves[number], n_moving, screens, work) >= 0
+        if 0.0 < screens.opens[number] < 1.0 and not is_known and n_moving < MOST_MOVING:
+            work.moving[n_moving] = number
+            n_moving += 1
+    return n_moving
+
+
+@kernel
+def _index_of_leaf(leaf: int, n_moving: int, screens: Screens, work: Work) -> int:
+    """Return the index of a leaf in `Work.moving`, -1 if it is not there."""
+    index = -1
+    for k in range(n_moving):
+        if screens.leaves[work.moving[k]] == leaf:
+            index = k
+    return index
+
+
+@kernel
+def _choose_closed(
+    count: int, n_moving: int, combination: int, screens: Screens, work: Work
+) -> int:
+    """Choose boxes and closed leaves; return how many these are.
+
+    Args:
+        count: How many silhouettes there are.
+        n_moving: How many leaves are neither open nor closed.
+        combination: Which of these count as closed, one bit for each.
+        screens: All screens.
+        work: See `energy_past`.
+    """
+    n_chosen = 0
+    for m in range(count):
+        number = work.numbers[m]
+        if screens.kinds[number] == LEAF:
+            continue
+        index = _index_of_leaf(screens.leaves[number], n_moving, screens, work)
+        is_closed = (combination >> index) & 1 == 1 if index >= 0 else screens.opens[number] < 0.5
+        if screens.kinds[number] == BOX or is_closed:
+            work.chosen[n_chosen] = m
+            n_chosen += 1
+    return n_chosen
+
+
+@kernel
+def _multiply(energy: Floats, share: float, work: Work) -> None:
+    """Multiply energies by those of the last composite, to the power of its share."""
+    for band in range(N_BANDS):
+        factor = work.part[0, band]
+        energy[band] *= factor if share == 1.0 else factor**share
 
 
 @kernel
@@ -153,17 +204,6 @@ def add_measure(rectangle: Floats, weight: float, measures: Floats) -> None:
         width = _below(root * rectangle[1]) - _below(root * rectangle[0])
         height = _below(root * rectangle[3]) - _below(root * rectangle[2])
         measures[band] += weight * width * height
-
-
-@kernel
-def _choose(count: int, kind: int, is_kind: bool, screens: Screens, work: Work) -> int:
-    """Choose the silhouettes of one kind of screen, or of all others; return how many these are."""
-    n_chosen = 0
-    for m in range(count):
-        if (screens.kinds[work.numbers[m]] == kind) == is_kind:
-            work.chosen[n_chosen] = m
-            n_chosen += 1
-    return n_chosen
 
 
 @kernel

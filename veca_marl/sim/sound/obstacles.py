@@ -217,7 +217,8 @@ def find_screens(
     openness = _openness(leaves, closed)
     opens[n_boxes:] = np.tile(openness, 2)
     kinds = np.repeat([BOX, LEAF, CLOSED], [n_boxes, len(leaves[0]), len(leaves[0])])
-    screens = Screens(centres, rotations, halves, bounds, joints, rooms, kinds, opens)
+    own = np.concatenate([np.full(n_boxes, -1), np.tile(np.arange(len(leaves[0])), 2)])
+    screens = Screens(centres, rotations, halves, bounds, joints, rooms, kinds, opens, own)
     amid = ((centres > lower.min(axis=0)) & (centres < upper.max(axis=0))).all(axis=1)
     inside = [
         np.array([n for n in numbers if _is_inside(screens, int(n), low, high - low)], np.int64)
@@ -267,7 +268,8 @@ def _openings(
     rooms = np.full(len(own), -1)
     rotations = np.repeat(np.eye(3)[None], len(own), axis=0)
     bounds = _bounds(centres, rotations, halves, rooms, lower, upper)
-    return Screens(centres, rotations, halves, bounds, np.zeros_like(bounds), rooms, kinds, opens)
+    joints = np.zeros_like(bounds)
+    return Screens(centres, rotations, halves, bounds, joints, rooms, kinds, opens, rooms)
 
 
 def _lintel_m(position: Floats, boxes: Boxes, ceiling_m: float) -> float:

@@ -129,9 +129,9 @@ def read_moving(
         fraction = whole - delay
         run = n - i  # samples until the whole part of the delay changes
         if slope > 0.0:
-            run = min(run, int(fraction / slope) + 1)
+            run = min(run, int(min(fraction / slope, float(n))) + 1)  # the ratio has no limit
         elif slope < 0.0:
-            run = min(run, int((1.0 - fraction) / -slope) + 1)
+            run = min(run, int(min((1.0 - fraction) / -slope, float(n))) + 1)
         first = end - n + i - whole
         part = out[i : i + run]
         if first < start:

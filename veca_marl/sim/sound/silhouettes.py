@@ -20,6 +20,9 @@ from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 MOST_SETS = 128
 """Sets of silhouettes of which one composite remembers the transmission."""
 
+MOST_MOVING = 4
+"""Leaves near one path that count as neither open nor closed; of others the nearer one counts."""
+
 _SEALED = 1e3  # Fresnel parameter over the root of the frequency of an edge that is none
 _STRADDLED_M = 0.05  # a joint with another wall closes a wall that the path meets so far from it
 _FAR_M, _FAR_RATIO = 6.0, 0.5  # beyond that beside a path obstacles are left out
@@ -40,6 +43,7 @@ class Screens(NamedTuple):
         rooms: ``(n,)`` number of the room that they stand in, -1 for walls between rooms.
         kinds: ``(n,)`` `BOX`, `LEAF`, or `CLOSED`: a leaf where it would be closed.
         opens: ``(n,)`` how far a leaf is open, from 0 to 1; -1 for boxes.
+        leaves: ``(n,)`` number of the leaf, where it is and where it would be closed; -1 for boxes.
     """
 
     centres: Floats
@@ -50,6 +54,7 @@ class Screens(NamedTuple):
     rooms: NDArray[np.int64]
     kinds: NDArray[np.int64]
     opens: Floats
+    leaves: NDArray[np.int64]
 
 
 class Line(NamedTuple):
@@ -97,6 +102,7 @@ class Work(NamedTuple):
         begin: ``(3,)`` metres, start of the path in the coordinates of the room.
         way: ``(3,)`` metres, from its start to its end.
         cell: ``(3,)`` the copy of the room that it passes.
+        moving: ``(MOST_MOVING,)`` screens of the leaves that are neither open nor closed.
     """
 
     corners: Floats
@@ -124,6 +130,7 @@ class Work(NamedTuple):
     begin: Floats
     way: Floats
     cell: NDArray[np.int64]
+    moving: NDArray[np.int64]
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,6 +162,7 @@ def make_work(most: int) -> Work:
         np.empty(3),
         np.empty(3),
         np.empty(3, np.int64),
+        np.empty(MOST_MOVING, np.int64),
     )
 
 
@@ -324,7 +332,10 @@ def _seal(
     extent: Floats,
     rectangle: Floats,
 ) -> None:
-    """Move the edges of a silhouette that meet something outwards, see `Screens`."""
+    """Move the edges of a silhouette that meet something outwards, see `Screens`.
+
+    An edge on the other side of the line stays: moved outwards it would pass over the line.
+    """
     for axis in range(2):
         lit = max(-extent[2 * axis], 0.0), max(extent[2 * axis + 1], 0.0)
         straddled = min(lit[0] / _STRADDLED_M, 1.0) * min(lit[1] / _STRADDLED_M, 1.0)
@@ -341,5 +352,6 @@ def _seal(
                 face = side if normal > 0.0 else 1 - side
                 moved = straddled * screens.joints[number, k, face] * normal * normal
                 face = side if across > 0.0 else 1 - side
-                moved = max(moved, screens.bounds[number, k, face] * across * across)
+                own = min(lit[side] / _STRADDLED_M, 1.0)
+                moved = max(moved, own * screens.bounds[number, k, face] * across * across)
                 rectangle[2 * axis + side] += _SEALED * (moved if side == 1 else -moved)
