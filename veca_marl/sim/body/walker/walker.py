@@ -23,6 +23,7 @@ from veca_marl.sim.body.walker.actions import (
     WalkCommand,
     verb_spec,
 )
+from veca_marl.sim.body.walker.eyes import kept_inside
 from veca_marl.sim.body.walker.feet import foot_steps_on
 from veca_marl.sim.body.walker.gait import Gait
 from veca_marl.sim.body.walker.ground_motion import Footsteps, GroundMotion
@@ -30,7 +31,7 @@ from veca_marl.sim.body.walker.handling import ObjectHandling
 from veca_marl.sim.body.walker.stances import BonePoses, make_stances
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg, greatest_speed_mps, sized
 from veca_marl.sim.body.walker.walker_collisions import Footprint, walker_collisions
-from veca_marl.sim.geometry import Floats
+from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.physics import Prop, World
 from veca_marl.sim.physics.interactions import Close, Open
 from veca_marl.sim.sense import ArraySpec
@@ -106,6 +107,9 @@ class Walker(Body):
     def footprint(self) -> Footprint:
         """The capsule in use on the floor plan."""
         return self._motion.capsule.footprint
+
+    def _kept_eye(self, eye: Pose, head: Pose) -> Pose:
+        return kept_inside(eye, head, self._head_size, self._motion.ground, self.footprint)
 
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
         """Stand at a place on the floor, facing `yaw_rad`, looking ahead, with empty hands.

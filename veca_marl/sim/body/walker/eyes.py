@@ -1,0 +1,65 @@
+"""Eyes of a walker stay within its capsule: what stops the capsule is never behind an eye."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from veca_marl.sim.body.sense_organs import EYES, MOUNTS_M
+from veca_marl.sim.body.walker.walker_collisions import Footprint
+from veca_marl.sim.geometry import Floats, Pose
+
+CLEARANCE_M = 0.005
+"""Least distance of an eye from the surface of the capsule on the floor plan."""
+
+
+def kept_inside(
+    eye: Pose, head: Pose, head_size: float, centre: Floats, footprint: Footprint
+) -> Pose:
+    """Return the pose of an eye, moved back on the floor plan if it is too far out.
+
+    A head that is bent forward reaches out of a capsule. Both eyes are moved alike, so that their
+    distance from each other stays what it is.
+
+    Args:
+        eye: Pose of the eye.
+        head: Pose of the head bone.
+        head_size: `Growth.head_size` of the body.
+        centre: ``(2,)`` metres, position of the capsule on the floor plan.
+        footprint: The capsule there.
+    """
+    limit = footprint.radius_m - CLEARANCE_M
+    both = [_from_axis(head, name, head_size, centre, footprint) for name in EYES]
+    if max(math.hypot(x, y) for x, y in both) <= limit:
+        return eye
+    middle_x, middle_y = (sum(each) / 2.0 for each in zip(*both, strict=True))
+    length = math.hypot(middle_x, middle_y)
+    out_x, out_y = middle_x / length, middle_y / length
+    shift = max(_excess(x * out_x + y * out_y, math.hypot(x, y), limit) for x, y in both)
+    return Pose(eye.position - (shift * out_x, shift * out_y, 0.0), eye.rotation)
+
+
+def _from_axis(
+    head: Pose, name: str, head_size: float, centre: Floats, footprint: Footprint
+) -> tuple[float, float]:
+    """Return the way from the nearest point of the axis of a capsule to an eye, on the plan."""
+    x, y, _ = (head.position + head.rotation @ (np.array(MOUNTS_M[name]) * head_size)).tolist()
+    x, y = x - float(centre[0]), y - float(centre[1])
+    axis_x, axis_y = footprint.half_axis_m
+    square = axis_x * axis_x + axis_y * axis_y
+    along = 0.0 if square == 0.0 else (x * axis_x + y * axis_y) / square
+    along = min(max(along, -1.0), 1.0)
+    return x - along * axis_x, y - along * axis_y
+
+
+def _excess(out: float, distance: float, limit: float) -> float:
+    """Return by how much a point has to move inwards until it is at a limit from the axis.
+
+    Args:
+        out: Its distance from the axis along the direction of the motion, metres.
+        distance: Its distance from the axis.
+        limit: The greatest one.
+    """
+    aside_square = max(distance * distance - out * out, 0.0)
+    return out - math.sqrt(max(limit * limit - aside_square, 0.0))
