@@ -2,12 +2,14 @@
 
 import logging
 import os
+import re
 
 import pytest
 import torch
 from refusals import naming
 
 from veca_marl.algos.collection.experience import CollectCfg
+from veca_marl.datasets.command import main as datasets
 from veca_marl.processes import cores as process_cores
 from veca_marl.processes.cores import CORES, usable_cores
 from veca_marl.runs import cores, training
@@ -97,3 +99,10 @@ def test_cores_are_no_more_than_a_container_or_the_user_allows(monkeypatch, tmp_
         monkeypatch.setenv(CORES, wrong)
         with pytest.raises(ValueError, match=naming(CORES, wrong)):
             usable_cores()
+
+
+def test_a_wrong_number_of_cores_ends_in_one_line(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv(CORES, "two")
+    words = ["make", "+dataset=sound_localisation", "n=2", f"out={tmp_path / 'data'}"]
+    assert datasets(words) == 2
+    assert re.search(naming(CORES, "two"), capsys.readouterr().err.strip())

@@ -36,6 +36,7 @@ from veca_marl.config.experiment import check_arm
 from veca_marl.config.stored import change
 from veca_marl.config.training_help import training_help
 from veca_marl.processes.children import end_with_parent
+from veca_marl.processes.cores import CoresError
 from veca_marl.processes.supervision import WorkerError
 from veca_marl.registry import unknown
 from veca_marl.runs.assembly import decide_precision, make_trainer
@@ -208,7 +209,9 @@ def main() -> None:
         sys.argv[1:] = prepare(sys.argv[1:])
         _check_folders(sys.argv[1:])
         run()
-    except (ConfigError, SweepError, HydraException, OmegaConfBaseException) as error:
+    except (
+        ConfigError, CoresError, SweepError, HydraException, OmegaConfBaseException,
+    ) as error:  # fmt: skip
         give_up(error)
     except KeyboardInterrupt:  # a sweep; `run` handles that of a single run
         raise SystemExit(130) from None

@@ -62,6 +62,27 @@ def written(parts, tmp_path_factory):
     return folder
 
 
+def test_images_with_odd_sides_are_refused_before_anything_is_written(tmp_path):
+    pytest.importorskip("pyarrow", reason="the extra [lerobot] is not installed")
+    numbers = ["senses.vision.width=63", "senses.vision.height=62", "task.max_seconds=0.2"]
+    odd = recorded(tmp_path / "odd", "+task=KickTheBall", *numbers)
+    with pytest.raises(DemonstrationsError, match=naming("vision", "63 x 62")):
+        export_lerobot(DemonstratedAgent(odd, None), tmp_path / "here")
+    assert not (tmp_path / "here").exists()
+
+
+def test_an_export_that_fails_leaves_nothing(parts, tmp_path, monkeypatch):
+    pytest.importorskip("pyarrow", reason="the extra [lerobot] is not installed")
+
+    def fail(*_):
+        raise ArithmeticError
+
+    monkeypatch.setattr(RunningStatistics, "to_dict", fail)
+    with pytest.raises(ArithmeticError):
+        export_lerobot(DemonstratedAgent(parts, None), tmp_path / "here")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.fixture(scope="module")
 def info(written):
     return json.loads((written / "meta" / "info.json").read_text())

@@ -40,6 +40,12 @@ def test_a_client_with_its_key_is_served(locked, folder):
         assert env.rollout(3).shape == (1, 3)
 
 
+@pytest.mark.parametrize("address", ["tcp://*:5555", "tcp://127.0.0.1:*", "tcp://-:80"])
+def test_an_address_to_listen_at_is_none_to_connect_to(address):
+    with pytest.raises(ValueError, match=naming(address)):
+        RemoteWorlds(address, timeout_s=5.0)
+
+
 def test_a_peer_without_a_key_is_refused(locked):
     with pytest.raises(RemoteError, match=naming(locked.address, "key=")):
         RemoteWorlds(locked.address, timeout_s=20.0)

@@ -23,6 +23,7 @@ from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.overrides import parse
 from veca_marl.config.root import Config
 from veca_marl.override_text import normalised
+from veca_marl.processes.cores import CoresError
 from veca_marl.registry import unknown
 from veca_marl.version import __version__
 
@@ -84,7 +85,7 @@ class CommandLine(Generic[Options]):
         if VERSION in words:
             print_version()
             return 0
-        expected: tuple[type[Exception], ...] = (ConfigError, *self.errors)
+        expected: tuple[type[Exception], ...] = (ConfigError, CoresError, *self.errors)
         try:
             for options, overrides in self.jobs(words):
                 call(options, overrides)

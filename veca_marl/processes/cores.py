@@ -16,6 +16,10 @@ Sweeps set it for each of their runs.
 _QUOTA = Path("/sys/fs/cgroup/cpu.max")  # of a container with ``docker run --cpus``
 
 
+class CoresError(ValueError):
+    """The environment variable `CORES` is no number of cores."""
+
+
 def usable_cores() -> int:
     """Return the number of cores that this process may use, at least 1.
 
@@ -23,7 +27,7 @@ def usable_cores() -> int:
     and the environment variable `CORES`.
 
     Raises:
-        ValueError: If `CORES` is no positive integer.
+        CoresError: If `CORES` is no positive integer.
     """
     affinity = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     numbers = [float(affinity or 1), *_quota(), *_asked()]
@@ -43,5 +47,5 @@ def _asked() -> list[float]:
     if asked is None:
         return []
     if not asked.isdecimal() or int(asked) < 1:
-        raise ValueError(f"{CORES}={asked!r} must be a positive number of cores")
+        raise CoresError(f"{CORES}={asked!r} must be a positive number of cores")
     return [float(asked)]

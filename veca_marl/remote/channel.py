@@ -55,6 +55,9 @@ class Channel:
         keys: Keys of this client; None for a server without keys.
         largest: Bytes of the largest frame that is read.
         timeout_s: Seconds without a word of the server after which it is given up.
+
+    Raises:
+        ValueError: If the address is none to connect to.
     """
 
     def __init__(
@@ -80,7 +83,12 @@ class Channel:
             self._socket.setsockopt(zmq.CURVE_SECRETKEY, keys.secret.encode())
             self._socket.setsockopt(zmq.CURVE_SERVERKEY, keys.server.encode())
         self._monitor: zmq.Socket[bytes] | None = self._socket.get_monitor_socket(_EVENTS)
-        self._socket.connect(address)
+        try:
+            self._socket.connect(address)
+        except zmq.ZMQError as error:  # "*" is an address to listen at
+            self._stop_monitor()
+            self._socket.close(0)
+            raise ValueError(f"address={address} is none to connect to: {error.strerror}") from None
 
     def ask(self, kind: str, fields: dict[str, Any] | None = None, data: Any = b"") -> Message:
         """Send a request; return its result.

@@ -46,6 +46,26 @@ def test_a_flat_observation_is_one_vector_of_all_senses(opened):
     np.testing.assert_array_equal(after, joined(expected))
 
 
+@pytest.mark.parametrize("wrong", [7, -50])
+def test_the_entries_of_a_choice_are_in_their_space(opened, wrong):
+    env = opened(gym_env, "KickTheBall", body="walker_voice", layout="flat", **CHEAP)
+    env.reset(seed=1)
+    action = np.zeros_like(env.action_space.sample())
+    action[-1] = wrong
+    assert action not in env.action_space
+    with pytest.raises(ValueError, match=naming("voice", str(wrong))):
+        env.step(action)
+    env.step(np.clip(action, -1.0, 1.0))
+
+
+@pytest.mark.parametrize("wrong", [None, [np.zeros(2, np.float32)], 3])
+def test_actions_that_are_no_mapping_are_refused(opened, wrong):
+    env = opened(parallel_env, "KickTheBall", **CHEAP)
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match="agent"):
+        env.step(wrong)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", ["stacked", "flat"])
 @pytest.mark.parametrize("body", ["walker_voice", "walker_discrete_voice"])

@@ -47,6 +47,15 @@ def drive(game, steps):
     return np.array(track)
 
 
+@pytest.mark.parametrize("limit_kg", [0.5, 1.5, 5.0])
+def test_a_player_that_stands_still_is_hit_whatever_it_can_push(limit_kg):
+    game = game_of(f"body.push_limit_kg={limit_kg}")
+    for seed in range(3):
+        game.reset(np.random.default_rng(seed))
+        assert any(walk(game).terminated for _ in range(500))
+    game.close()
+
+
 @pytest.mark.parametrize(
     ("task", "speed"),
     [("DodgeCar", "50"), ("ChaseCar", "50"), ("KickTheBall", "[50,60]")],

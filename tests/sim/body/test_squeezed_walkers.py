@@ -222,3 +222,28 @@ def test_a_reset_after_a_squeeze_restores_the_world_bit_by_bit():
         world.prop("heavy").set_velocity((2.0, 0.0, 0.0))
         world.step()
     np.testing.assert_array_equal(episode(world, walker), fresh)
+
+
+@pytest.mark.parametrize("kind", ["wall", "heavy", "light"])
+def test_it_touches_what_stops_it_and_what_it_pushes(kind):
+    ahead = {
+        "wall": wall_ahead(0.1, "thing"),
+        "heavy": heavy_box("thing", position=(1.0, 0.0, 0.2)),
+        "light": box("thing", (0.2, 0.2, 0.2), 0.5, (1.0, 0.0, 0.1)),
+    }[kind]
+    world, walker = start(ahead, place=(0.3, 0.0, 0.0))
+    thing = world.prop("thing")
+    world.step()
+    assert not walker.touches(thing)
+    walker.walk(1.0, 0.0)
+    touched = False
+    for _ in range(40):
+        world.step()
+        touched |= walker.touches(thing)
+    assert touched
+    if kind != "light":
+        assert walker.touches(thing)
+        walker.walk(-0.5, 0.0)
+        for _ in range(5):
+            world.step()
+        assert not walker.touches(thing)

@@ -19,6 +19,7 @@ as their numbers.
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -59,7 +60,7 @@ def export_lerobot(agent: DemonstratedAgent, folder: Path) -> None:
 
     Raises:
         ModuleNotFoundError: Without the extra ``[lerobot]``.
-        DemonstrationsError: If the folder exists.
+        DemonstrationsError: If the folder exists, or images have an odd width or height.
         WriteError: If a file cannot be written.
     """
     try:
@@ -70,8 +71,19 @@ def export_lerobot(agent: DemonstratedAgent, folder: Path) -> None:
         ) from error
     if folder.exists():
         raise DemonstrationsError(f"{folder} exists; choose another folder")
+    for sense, layout in agent.observations.items():
+        if layout.is_image and any(length % 2 for length in layout.shape[-2:]):
+            height, width = layout.shape[-2:]
+            raise DemonstrationsError(
+                f"{sense} has {width} x {height} pixels: videos need even numbers; format=minari "
+                "takes all"
+            )
     with write_errors(folder):
-        _Export(agent, folder).write()
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".") as draft:
+            complete = Path(draft, folder.name)
+            _Export(agent, complete).write()
+            complete.rename(folder)
 
 
 @dataclass

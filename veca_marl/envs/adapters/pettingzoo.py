@@ -101,12 +101,7 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
             RuntimeError: If no episode is running, or the environment is closed.
             ValueError: If an action is missing, invalid, or for an unknown agent.
         """
-        step = self._played.step(
-            {
-                name: self._actions[name].parts(action) if name in self._actions else action
-                for name, action in actions.items()
-            }
-        )
+        step = self._played.step(self._in_parts(actions))
         names = self.agents
         self.agents = [] if step.done else self._played.playing
         return (
@@ -116,6 +111,15 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
             dict.fromkeys(names, step.truncated),
             {name: step.info(name) for name in names},
         )
+
+    def _in_parts(self, actions: Any) -> Any:
+        """Return actions as the game takes them; it refuses what is no mapping."""
+        if not isinstance(actions, Mapping):
+            return actions
+        return {
+            name: self._actions[name].parts(action) if name in self._actions else action
+            for name, action in actions.items()
+        }
 
     def snapshot(self) -> Snapshot:
         """Return the state between two steps, from which `restore` continues.

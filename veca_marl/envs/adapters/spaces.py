@@ -113,6 +113,8 @@ class FlatActions(Actions):
         begin = 0
         for name, spec in self.specs.items():
             entries = vector[begin : (begin := begin + _entries(spec))]
+            if spec.is_discrete and np.abs(entries).max() > 1.0:
+                raise ValueError(f"action {action!r}: the entries of {name} must be in [-1, 1]")
             choice = np.int64(entries.argmax()) if spec.is_discrete else None
             parts[name] = entries.reshape(spec.shape) if choice is None else choice
         return parts

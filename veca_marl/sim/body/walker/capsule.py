@@ -55,6 +55,7 @@ _LIMB_REACH_M = 1.0  # from the pelvis of a joint-level body to its stretched to
 _GAP_M = 0.01  # more than the margins of Bullet's shapes
 _CARPET_M = 0.02  # what is lower is walked over
 _DEPTH_M = 1e-6  # less is rounding
+_TOUCH_M = 0.005  # what stops it is left so near at most
 
 
 class Capsule:
@@ -306,6 +307,12 @@ class Capsule:
     def _contacts(self, body_id: int) -> tuple[ContactPoint, ...]:
         """Return PyBullet's points of contact with a body; normals point to the capsule."""
         return self._client.getClosestPoints(self.body_id, body_id, 0.0)
+
+    def touches_obstacle(self, body_id: int) -> bool:
+        """Return whether it is at something that stops it, with which Bullet has no contacts."""
+        if body_id not in self._obstacles.ids:
+            return False
+        return bool(self._client.getClosestPoints(self.body_id, body_id, _TOUCH_M))
 
     def _find_obstacles(self, props: dict[str, Prop], bodies: Sequence[int]) -> None:
         """Find everything that cannot be pushed and disable Bullet's contacts with it."""

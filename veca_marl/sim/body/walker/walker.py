@@ -111,6 +111,10 @@ class Walker(Body):
     def _kept_eye(self, eye: Pose, head: Pose) -> Pose:
         return kept_inside(eye, head, self._head_size, self._motion.ground, self.footprint)
 
+    def touches(self, prop: Prop) -> bool:
+        """See `Body.touches`."""
+        return super().touches(prop) or self._motion.capsule.touches_obstacle(prop.body_id)
+
     def place(self, position: Floats | tuple[float, float, float], yaw_rad: float = 0.0) -> None:
         """Stand at a place on the floor, facing `yaw_rad`, looking ahead, with empty hands.
 
