@@ -39,9 +39,8 @@ class ImitatorCfg(AlgorithmCfg):
         sequence_steps: Consecutive steps through which gradients of a network with hidden state
             flow; an update has ``batch_size / sequence_steps`` such sequences.
         burn_in: Steps before each sequence by which the hidden state is computed, from zero.
-        least_scale: Standard deviation before tanh with which the policy repeats continuous actions
-            that it has learnt without an error, see `ImitationLoss`: what remains for PPO to
-            explore with.
+        least_scale: Standard deviation before tanh of continuous actions that the policy has learnt
+            without an error, see `ImitationLoss`: what remains for PPO to explore with.
         max_gradient_norm: Gradients are scaled down to this norm.
     """
 

@@ -45,20 +45,20 @@ class Imitated:
 
 
 class ImitationLoss:
-    """The negative log-likelihood of demonstrated actions, for actions of any form.
+    """The cross entropy of a policy with demonstrated actions, for actions of any form.
 
-    Of a choice it is the cross entropy. Of a vector it is the cross entropy of the normal
-    distribution before tanh with a normal distribution about what was demonstrated, of the standard
-    deviation `least_scale`. The scale at which it is least is the root of the mean squared error
-    plus ``least_scale ** 2``: with a single demonstrated value in place of the distribution, the
-    scale of a policy that repeats what it was shown would shrink until nothing can be explored from
-    it, and the gradients would grow with the inverse square.
+    For a vector, the demonstration is a normal distribution before tanh: its mean is the
+    demonstrated action, its standard deviation `least_scale`. The loss of a policy with the mean
+    squared error ``e`` is smallest at the scale ``sqrt(e + least_scale ** 2)``. With the
+    likelihood of the demonstrated action alone, the scale of a policy that repeats a deterministic
+    expert would shrink to zero: nothing could be explored from it, and gradients would grow with
+    the inverse square.
 
     Args:
         team: Name of the team.
         actions: Part of the action to its layout.
-        least_scale: Standard deviation, before tanh, of the distribution about what was
-            demonstrated: the scale of a policy without errors.
+        least_scale: Standard deviation of a demonstration before tanh: the scale of a policy
+            without errors.
         labels: Part of the action to the key of what was demonstrated; None is that of the action.
     """
 

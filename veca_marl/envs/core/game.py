@@ -311,7 +311,7 @@ class Game:
         return {player.name: player.body.info() for player in self.players}
 
     def rebuild(self) -> None:
-        """Build everything anew, as a new game does: no episode has begun then."""
+        """Build world, players, task and senses again, as in a new game: no episode has begun."""
         self.world.close()
         cfg = self.cfg
         vars(self).clear()
@@ -319,10 +319,9 @@ class Game:
 
     @property
     def broken(self) -> list[str]:
-        """Names of the bodies and props whose state is not finite any more.
+        """Names of the bodies and props whose state is no longer finite.
 
-        Bullet does not recover from that, whatever is restored: `reset` and `Restoring` build
-        everything anew.
+        Bullet does not recover from that: `reset` and `Restoring` call `rebuild`.
         """
         bodies = [player.name for player in self.players if not player.body.is_finite]
         return bodies + self.world.broken_props

@@ -180,12 +180,12 @@ class Capture:
         raise _no_data(item, owner)
 
     def _check_is_data(self, item: Any, owner: str) -> None:
-        """Refuse objects whose content is not in their attributes, such as files and iterators."""
+        """Refuse objects that attributes alone do not describe, such as files and iterators."""
         kind = type(item)
         if kind in _WITH_CONTENT:
             return
         if isinstance(item, (dict, list, set, frozenset, deque, np.ndarray)):
-            raise _no_data(item, owner)  # a kind of its own, whose items are not attributes
+            raise _no_data(item, owner)  # of a subclass: attributes would be kept, its items lost
         try:
             object.__new__(kind) if not isinstance(item, tuple) else None
         except TypeError:

@@ -106,13 +106,13 @@ class Snapshots:
             episodes: `Episodes.state` of its world.
 
         Raises:
-            RuntimeError: If no episode has begun, or the simulation is not finite any more.
+            RuntimeError: If no episode has begun, or the state is no longer finite.
             SnapshotError: If an object of the game is no data, such as a generator that runs.
         """
         if not game.has_begun:
             raise RuntimeError("no episode has begun: call reset() before snapshot()")
         if game.broken:
-            raise RuntimeError("the simulation is not finite any more: call reset()")
+            raise RuntimeError("the simulation is no longer finite: call reset()")
         states = Capture(game.built, self._constant).states()
         physics = game.world.save_physics()
         return Snapshot(game.cfg.task.name, _digest(game), states, physics, episodes)
@@ -121,7 +121,7 @@ class Snapshots:
 class Restoring:
     """A snapshot that was checked against the game that it is to be restored in.
 
-    A game whose simulation is not finite any more is built anew first.
+    A game whose state is no longer finite is first built again, see `Game.rebuild`.
 
     Args:
         game: The game.
