@@ -313,9 +313,9 @@ class Body(ABC):
         """Return the pose of a sense organ, one of `MOUNTS`; eyes look along their x axis."""
         head = Pose(self._drawn.positions[self._head], self._drawn.rotations[self._head])
         organ = resting_mount(name, head, self._head_size)
-        return self._gaze.turned(name, self._kept_eye(organ, head)) if name in EYES else organ
+        return self._gaze.turned(name, self._kept_eye(name, organ)) if name in EYES else organ
 
-    def _kept_eye(self, eye: Pose, head: Pose) -> Pose:
+    def _kept_eye(self, name: str, eye: Pose) -> Pose:
         """Return the pose of an eye that looks straight ahead; bodies may keep it off walls."""
         return eye
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from veca_marl.sim.body.sense_organs import EYES, MOUNTS_M
 from veca_marl.sim.body.walker.walker_collisions import Footprint
 from veca_marl.sim.geometry import Floats, Pose
 
@@ -12,50 +11,33 @@ CLEARANCE_M = 0.005
 """Least distance of an eye from the surface of the capsule on the floor plan."""
 
 
-def kept_inside(
-    eye: Pose, head: Pose, head_size: float, centre: Floats, footprint: Footprint
-) -> Pose:
+def kept_inside(eye: Pose, to_other_m: float, centre: Floats, footprint: Footprint) -> Pose:
     """Return the pose of an eye, moved back on the floor plan if it is too far out.
 
     A head that is bent forward reaches out of a capsule. Both eyes are moved alike, so that their
     distance from each other stays what it is.
 
     Args:
-        eye: Pose of the eye.
-        head: Pose of the head bone.
-        head_size: `Growth.head_size` of the body.
+        eye: Pose of the eye, with the axes of the head.
+        to_other_m: Way to the other eye along the left axis of the head.
         centre: ``(2,)`` metres, position of the capsule on the floor plan.
         footprint: The capsule there.
     """
     limit = max(footprint.radius_m - CLEARANCE_M, 0.0)
-    both = [_from_axis(*place, footprint) for place in _places(head, head_size, centre)]
-    if max(math.hypot(x, y) for x, y in both) <= limit:
+    # numbers are faster than arrays: this is read several times in each step
+    x, y = float(eye.position[0] - centre[0]), float(eye.position[1] - centre[1])
+    left_x, left_y = float(eye.rotation[0, 1]), float(eye.rotation[1, 1])
+    other_x, other_y = x + to_other_m * left_x, y + to_other_m * left_y
+    if max(x * x + y * y, other_x * other_x + other_y * other_y) <= limit * limit:
+        return eye
+    both = [_from_axis(*place, footprint) for place in ((x, y), (other_x, other_y))]
+    if max(math.hypot(*place) for place in both) <= limit:
         return eye
     middle_x, middle_y = (sum(each) / 2.0 for each in zip(*both, strict=True))
     length = math.hypot(middle_x, middle_y)
     out_x, out_y = middle_x / length, middle_y / length
     shift = max(_excess(x * out_x + y * out_y, math.hypot(x, y), limit) for x, y in both)
     return Pose(eye.position - (shift * out_x, shift * out_y, 0.0), eye.rotation)
-
-
-def _places(head: Pose, head_size: float, centre: Floats) -> list[tuple[float, float]]:
-    """Return the ways from a point of the floor plan to both eyes; numbers are faster than arrays.
-
-    Args:
-        head: Pose of the head bone.
-        head_size: `Growth.head_size` of the body.
-        centre: ``(2,)`` metres, the point.
-    """
-    places = []
-    to_head, rotation = (head.position[:2] - centre).tolist(), head.rotation.tolist()
-    for name in EYES:
-        ahead, left, up = MOUNTS_M[name]
-        x, y = (
-            to_head[i] + head_size * (axis[0] * ahead + axis[1] * left + axis[2] * up)
-            for i, axis in enumerate(rotation[:2])
-        )
-        places.append((x, y))
-    return places
 
 
 def _from_axis(x: float, y: float, footprint: Footprint) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action
 from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.sense_organs import MOUNTS_M
 from veca_marl.sim.body.walker.actions import (
     REFUSED,
     VERB,
@@ -108,8 +109,9 @@ class Walker(Body):
         """The capsule in use on the floor plan."""
         return self._motion.capsule.footprint
 
-    def _kept_eye(self, eye: Pose, head: Pose) -> Pose:
-        return kept_inside(eye, head, self._head_size, self._motion.ground, self.footprint)
+    def _kept_eye(self, name: str, eye: Pose) -> Pose:
+        to_other_m = -2.0 * MOUNTS_M[name][1] * self._head_size
+        return kept_inside(eye, to_other_m, self._motion.ground, self.footprint)
 
     def touches(self, prop: Prop) -> bool:
         """See `Body.touches`."""
