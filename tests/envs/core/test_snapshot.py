@@ -244,7 +244,7 @@ def _foreign_class(structure):
 
 
 def _foreign_function(structure):
-    structure["made"] = [["list", [["named_object", "os:system"]]] for _ in structure["made"]]
+    structure["made"] = [["list", [["class", "os:system"]]] for _ in structure["made"]]
 
 
 def _numbers_beyond(structure):
@@ -280,12 +280,12 @@ def _imported_class(structure):
 
 
 def _imported_function(structure):
-    value = ["named_object", "veca_marl.envs.core.snapshot:os.replace"]
+    value = ["class", "veca_marl.envs.core.snapshot:os.replace"]
     structure["made"].append(["list", [value]])
 
 
-def _function_of_another_part(structure):
-    value = ["named_object", "veca_marl.stored_files:read_bytes"]
+def _function_of_the_game(structure):
+    value = ["class", "veca_marl.envs.core.snapshot:restore"]
     structure["made"].append(["list", [value]])
 
 
@@ -293,6 +293,15 @@ def _shadowed_method(structure):
     (task,) = [c for _, c in structure["built"] if c[0] == "object" and c[1].endswith(f":{TASK}")]
     structure["made"].append(["method", ["built", 0], "reset"])
     task[2].append(["terminated", ["made", len(structure["made"]) - 1]])
+
+
+def _class_of_another_part(structure):
+    structure["made"].append(["object", "veca_marl.stored_files:StoredFileError", []])
+
+
+def _method_of_a_class_that_was_not_built(structure):
+    structure["made"].append(["object", "veca_marl.envs.core.snapshot:Snapshot", []])
+    structure["made"].append(["method", ["made", len(structure["made"]) - 1], "save"])
 
 
 def _class_as_enumeration(structure):
@@ -312,7 +321,8 @@ def _no_digest(structure):
     "change",
     [_no_made, _other_format, _foreign_class, _foreign_function, _numbers_beyond, _wrong_kinds,
      _no_digest, _other_random, _addresses, _property, _negative_episode, _imported_class,
-     _imported_function, _function_of_another_part, _shadowed_method, _class_as_enumeration,
+     _class_of_another_part, _method_of_a_class_that_was_not_built,
+     _imported_function, _function_of_the_game, _shadowed_method, _class_as_enumeration,
      _one_array_twice],
 )  # fmt: skip
 def test_altered_files_are_refused_in_one_line(begun, snapshots, tmp_path, change):

@@ -109,21 +109,22 @@ def attributes(item: object) -> Iterator[tuple[str, object]]:
 
 
 class KnownNames:
-    """The classes and functions that a state may name: those of the packages of a game.
+    """The classes that a state may name, and the methods that it may hold.
 
-    Of this package these are only the parts that the game consists of. What a module has imported
-    from elsewhere is not among them.
+    Classes are those defined in the packages of a game; of this package, in the parts that the game
+    consists of. What a module has imported from elsewhere is not among them. Functions have no
+    names: those that a game was built with are among its built objects.
 
     Args:
         built: The objects of the game when it was built.
     """
 
     def __init__(self, built: BuiltObjects) -> None:
-        modules = {type(each).__module__ for each in built.objects}
-        self._packages = {_package(name) for name in modules} - _FOREIGN
+        self._types = {type(each) for each in built.objects}
+        self._packages = {_package(each.__module__) for each in self._types} - _FOREIGN
 
-    def find(self, name: str) -> type | types.FunctionType:
-        """Return the class or function that is called `module:name`.
+    def find(self, name: str) -> type:
+        """Return the class that is called `module:name`.
 
         Raises:
             SnapshotError: If there is none in the packages.
@@ -134,27 +135,19 @@ class KnownNames:
             found = sys.modules.get(module)
             for part in path.split("."):
                 found = None if found is None else inspect.getattr_static(found, part, None)
-        if not isinstance(found, (type, types.FunctionType)) or name_of(found) != name:
-            raise SnapshotError(f"{name} is no class or function of {sorted(self._packages)}")
-        return found
-
-    def find_class(self, name: str) -> type:
-        """Return the class that is called `module:name`; raise `SnapshotError` if none is."""
-        found = self.find(name)
-        if not isinstance(found, type):
-            raise SnapshotError(f"{name} is no class")
+        if not isinstance(found, type) or name_of(found) != name:
+            raise SnapshotError(f"{name} is no class of {sorted(self._packages)}")
         return found
 
     def method(self, owner: object, name: str) -> types.MethodType:
         """Return a method of an object; what is no method, such as a property, is not called.
 
         Raises:
-            SnapshotError: If its class has no such method, or has it from another package.
+            SnapshotError: If the game was built without objects of its class, or the class has no
+                such method.
         """
         function = inspect.getattr_static(type(owner), str(name), None)
-        if not isinstance(function, types.FunctionType) or (
-            _package(function.__module__) not in self._packages
-        ):
+        if type(owner) not in self._types or not isinstance(function, types.FunctionType):
             raise SnapshotError(f"{type(owner).__name__}.{name} is no method of the game")
         return types.MethodType(function, owner)
 
@@ -165,6 +158,6 @@ def _package(module: str) -> str:
     return ".".join(names[:2]) if names[0] == _OWN else names[0]
 
 
-def name_of(item: Any) -> str:
-    """Return the name of a class or function, as `KnownNames` finds it."""
+def name_of(item: type) -> str:
+    """Return the name of a class, as `KnownNames` finds it."""
     return f"{item.__module__}:{item.__qualname__}"

@@ -133,7 +133,8 @@ class Capture:
         if kind in _CONTAINERS.values():
             return kind.__name__, self._values(item, name)
         if kind is types.MethodType:
-            return "method", self._value(item.__self__, name), item.__func__.__name__
+            method = self._names.method(item.__self__, item.__func__.__name__)
+            return "method", self._value(item.__self__, name), method.__name__
         if kind is np.random.Generator:
             return "random", _frozen(item.bit_generator.state)
         if isinstance(item, tuple):
@@ -165,12 +166,12 @@ class Capture:
             return type(item).__name__, item.start, item.stop, item.step
         if isinstance(item, type) and issubclass(item, np.generic):
             return "number_type", np.dtype(item).str
-        if isinstance(item, (type, types.FunctionType)):
-            return "named_object", self._known_name(item, owner)
+        if isinstance(item, type):
+            return "class", self._known_name(item, owner)
         raise _no_data(item, owner)
 
-    def _known_name(self, item: type | types.FunctionType, owner: str) -> str:
-        """Return the name by which a class or function can be found again."""
+    def _known_name(self, item: type, owner: str) -> str:
+        """Return the name by which a class can be found again."""
         name = name_of(item)
         try:
             if self._names.find(name) is item:
@@ -272,11 +273,11 @@ class Putting:
     def _new(self, content: Value) -> Any:
         kind = content[0]
         if kind == "object":
-            return object.__new__(self._names.find_class(content[1]))
+            return object.__new__(self._names.find(content[1]))
         if kind in ("tuple", "frozenset"):
             return _CONTAINERS[kind](self._value(each) for each in content[1])
         if kind == "named":
-            return tuple.__new__(self._names.find_class(content[1]), map(self._value, content[2]))
+            return tuple.__new__(self._names.find(content[1]), map(self._value, content[2]))
         if kind == "proxy":
             pairs = (map(self._value, pair) for pair in content[1])
             return types.MappingProxyType(dict(pairs))  # type: ignore[arg-type]
@@ -315,7 +316,7 @@ class Putting:
             _check_kind(item.bit_generator, type(_bit_generator(state)))
             return lambda: setattr(item.bit_generator, "state", state)
         if kind == "object":
-            _check_kind(item, self._names.find_class(content[1]))
+            _check_kind(item, self._names.find(content[1]))
             values = {str(name): self._value(value) for name, value in content[2]}
             _check_attributes(type(item), values)
             return lambda: _set_attributes(item, values)
@@ -351,7 +352,7 @@ class Putting:
             return np.dtype(value[1]).type(value[2])
         if kind == "bytes":
             return bytes.fromhex(value[1])
-        if kind == "named_object":
+        if kind == "class":
             return self._names.find(value[1])
         if kind == "number_type":
             return np.dtype(value[1]).type
@@ -361,7 +362,7 @@ class Putting:
 
     def _member(self, name: str, member: str) -> Enum:
         """Return a member of an enumeration."""
-        found = self._names.find_class(name)
+        found = self._names.find(name)
         if not issubclass(found, Enum):
             raise SnapshotError(f"{name} is no enumeration")
         return found[member]
