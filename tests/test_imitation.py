@@ -1,15 +1,21 @@
 """Runs that learn from demonstrations: what is refused before they begin, and one that is made."""
 
 import csv
+import shutil
 
 import pytest
+import torch
 from composed import compose
 from refusals import naming
 
 import veca_marl
-from veca_marl.config import ConfigError
+from veca_marl.algos.demonstrations import Demonstrations
+from veca_marl.config import ConfigError, compose_node
 from veca_marl.demonstrations import main
-from veca_marl.runs.assembly import make_trainer
+from veca_marl.envs.core.task import find_task
+from veca_marl.runs.assembly import make_trainer, read_specs
+from veca_marl.runs.demonstrations import open_demonstrations
+from veca_marl.runs.run_folder import RunFolder
 
 SHORT = ["task.max_seconds=0.4", "senses/vision=blind"]
 SMALL = ["collect=one_process", "collect.worlds=2", "collect.steps=32", "eval.every_frames=128"]
@@ -56,6 +62,37 @@ def test_an_expert_that_lacks_a_sense_cannot_label():
     words = ["+task=KickTheBall", "senses/audio=deaf", "algo=dagger", *SMALL]
     with pytest.raises(ConfigError, match=naming("dagger", "audio")):
         make_trainer(compose([*words, "algo.replay.warm_up_frames=64"]))
+
+
+def test_rewards_are_those_of_the_weights_of_the_run(folder):
+    stored = Demonstrations(folder).rows["agents"]
+    run = cfg("task.weights.approach=3.0", "task.weights.kick=0.0")
+    found = open_demonstrations(str(folder), run.game, read_specs(run.game), ["agents"])
+    weights = find_task("KickTheBall").step_weights(run.game.task, run.game.clock)
+    wanted = sum(weight * stored["info", name] for name, weight in weights.items())
+    assert weights["approach"] == 3.0
+    assert (wanted - stored["reward"]).abs().max() > 1e-3
+    torch.testing.assert_close(found.rows["agents", "reward"], wanted)
+
+
+def test_rewards_of_the_same_weights_are_those_recorded(folder):
+    run = cfg()
+    found = open_demonstrations(str(folder), run.game, read_specs(run.game), ["agents"])
+    stored = Demonstrations(folder).rows["agents", "reward"]
+    torch.testing.assert_close(found.rows["agents", "reward"], stored)
+
+
+def test_a_resumed_run_does_not_learn_from_other_demonstrations(folder, tmp_path):
+    extended, run = tmp_path / "extended", RunFolder(tmp_path / "run")
+    shutil.copytree(folder, extended)
+    words = ["+task=KickTheBall", *SHORT, *SMALL, "algo=bc", f"demonstrations={extended}"]
+    run.begin(compose_node(words), words)
+    resumed = compose([*words, f"resume={run.path}"])
+    make_trainer(resumed, run)
+    assert main(["+task=KickTheBall", *SHORT, "episodes=5", "processes=0", f"to={extended}"]) == 0
+    with pytest.raises(ConfigError, match=naming(str(extended), "5 episodes")):
+        make_trainer(resumed, run)
+    make_trainer(compose(words), RunFolder(tmp_path / "other"))
 
 
 @pytest.mark.slow

@@ -204,6 +204,10 @@ def test_it_holds_what_was_recorded_and_makes_the_environment(minari, parts, tmp
         assert stored.truncations[-1]
     env = found.recover_environment()
     assert wanted.observations["audio"].shape[1:] == env.observation_space["audio"].shape
+    for number, about in enumerate(found.storage.get_episode_metadata([0, 1])):
+        first, _ = env.reset(seed=int(about["seed"]), options=about["options"])
+        for sense, array in agent.episode(number).observations.items():
+            np.testing.assert_array_equal(first[sense], array[0])
     env.close()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import mmap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -153,6 +153,25 @@ class Demonstrations:
     def trajectories(self) -> Iterator[TensorDict]:
         """Yield all episodes, see `trajectory`."""
         return (self.trajectory(number) for number in range(len(self)))
+
+    def weigh_rewards(self, team: str, weights: Mapping[str, float]) -> None:
+        """Replace the rewards of a team by weighted sums of the stored reward terms.
+
+        Args:
+            team: Name of the team.
+            weights: Weight in one step of each term; what is learnt from may weigh them otherwise
+                than what was recorded.
+
+        Raises:
+            DemonstrationsError: If a term was not recorded.
+        """
+        present = {array.key for array in self.card.arrays}
+        reward = torch.zeros_like(self.rows[team, "reward"], dtype=torch.float64)
+        for name, weight in weights.items():
+            if (team, "info", name) not in present:
+                raise DemonstrationsError(f"{self.folder} has no reward term {name!r} of {team!r}")
+            reward += weight * self.rows[team, "info", name].double()
+        self.rows[team, "reward"].copy_(reward)
 
     def step_rows(self) -> Tensor:
         """Return the numbers of all rows that have an action, ``(steps,)`` int64."""

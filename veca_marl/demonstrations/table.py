@@ -38,6 +38,7 @@ from veca_marl.stored_files import read_json
 
 EXPERT, RANDOM = "expert", "random"
 _WORLDS = 8
+_CHOICES = "choices.json"
 
 
 @dataclass
@@ -84,7 +85,8 @@ def make_table(options: TableOptions, overrides: Sequence[str]) -> str:
         overrides: Changes of the configuration of all runs, such as ``total_frames=1e6``.
 
     Raises:
-        ConfigError: If a choice is impossible, or a run in the folder is not complete.
+        ConfigError: If a choice is impossible, a run in the folder is not complete, or the folder
+            holds results of other choices.
     """
     folder = check_folder(options.to, "to")
     scores = {task: _scores(options, folder, task, overrides) for task in options.tasks}
@@ -99,6 +101,7 @@ def _scores(
     """Return the scores of each player of a task."""
     cfg = compose([f"+task={task}", *overrides])
     _check_frozen(cfg)
+    _check_choices(folder / task / _CHOICES, options, overrides)
     demonstrations = _recorded(options, folder / task / "demonstrations", cfg, overrides)
     found = {}
     for player, make in _players(options, folder / task, cfg, demonstrations, overrides):
@@ -108,6 +111,21 @@ def _scores(
             write_atomically(file, json.dumps(row, indent=1) + "\n")
         found[player] = read_json(file)
     return found
+
+
+def _check_choices(path: Path, options: TableOptions, overrides: Sequence[str]) -> None:
+    """Store the choices that all scores of a task depend on; refuse others than those stored."""
+    now = {"episodes": options.episodes, "seed": options.seed, "overrides": list(overrides)}
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, json.dumps(now, indent=1) + "\n")
+        return
+    before = read_json(path)
+    if differing := [name for name in now if before.get(name) != now[name]]:
+        texts = [f"{name}={before.get(name)!r:.400}, not {now[name]!r:.400}" for name in differing]
+        raise ConfigError(
+            f"{path.parent} holds results of {'; '.join(texts)}: choose another folder by to="
+        )
 
 
 def _check_frozen(cfg: Config) -> None:

@@ -39,7 +39,8 @@ def open_demonstrations(
 ) -> Demonstrations:
     """Return demonstrations from which teams of a run can learn.
 
-    Task parameters, playground and opponents may differ.
+    Task parameters, playground and opponents may differ. Rewards are those of the run's
+    `task.weights`, made of the terms that were recorded.
 
     Args:
         path: Their folder.
@@ -55,8 +56,10 @@ def open_demonstrations(
         found = Demonstrations(Path(path))
         _check_game(found, game)
         forms = team_forms(game, specs)
+        weights = find_task(game.task.name).step_weights(game.task, game.clock)
         for team in teams:
             found.check_team(team, forms[team])
+            found.weigh_rewards(team, weights)
     except DemonstrationsError as error:
         raise ConfigError(f"demonstrations: {error}") from error
     return found

@@ -18,6 +18,7 @@ from uuid import uuid4
 from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
 
+from veca_marl.algos.demonstration_files import Card
 from veca_marl.algos.files import left_behind, write_atomically
 from veca_marl.algos.policy_files import read_policy
 from veca_marl.algos.selfplay import SelfPlayCfg
@@ -140,8 +141,16 @@ class RunFolder:
         """Create the folder with the configuration and the provenance of the run."""
         # from the system's entropy: no generator of the run is touched
         content = {"id": uuid4().hex, **provenance(overrides), "bodies": body_names(node)}
+        if node.demonstrations is not None:
+            content["demonstrations"] = Card.read(Path(node.demonstrations)).checksum
         self._write_json(self.provenance, content)
         self._write_config(node)  # last: it is a run
+
+    @property
+    def demonstrations(self) -> str | None:
+        """Checksum of the demonstrations that the run learns from; None if none is stored."""
+        found = self._read_provenance().get("demonstrations")
+        return None if found is None else str(found)
 
     def begin_again(self, node: DictConfig, overrides: Sequence[str], frames: int) -> None:
         """Store how a run is continued.

@@ -67,12 +67,15 @@ def test_human_shows_each_step_in_a_window(monkeypatch):
     env.close()
 
 
-@pytest.mark.parametrize("options", [{"episode": -1}, {"episode": "x"}, 5])
+REFUSED = [{"episode": -1}, {"episode": "x"}, {"world": -1}, {"world": 0.5}, 5]
+
+
+@pytest.mark.parametrize("options", REFUSED, ids=str)
 def test_a_refused_reset_leaves_the_episodes_as_they_are(options):
     refused, other = gym_env("KickTheBall", **CHEAP), gym_env("KickTheBall", **CHEAP)
     for env in (refused, other):
         env.reset(seed=3)
-    with pytest.raises(ValueError, match="episode"):
+    with pytest.raises(ValueError, match=r"episode|world"):
         refused.reset(seed=9, options=options)
     found, expected = refused.reset()[0], other.reset()[0]
     np.testing.assert_array_equal(found["audio"], expected["audio"])

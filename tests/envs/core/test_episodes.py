@@ -113,6 +113,9 @@ def test_all_adapters_begin_at_an_episode_alike(cfg):
     pettingzoo.reset(options={"episode": 4})
     bodies = [player.body.forward for player in pettingzoo._played.game.players]
     np.testing.assert_array_equal(bodies, headings(torchrl)[:3])
+    pettingzoo.reset(seed=3, options={"episode": 4, "world": 1})
+    bodies = [player.body.forward for player in pettingzoo._played.game.players]
+    np.testing.assert_array_equal(bodies, headings(torchrl)[3:6])
     torchrl.close()
     pettingzoo.close()
 

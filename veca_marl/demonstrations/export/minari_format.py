@@ -54,6 +54,7 @@ def export_minari(agent: DemonstratedAgent, folder: Path, name: str | None = Non
             yield EpisodeBuffer(
                 id=number,
                 seed=card.seed,
+                options={"world": number},  # see `Card.seed`
                 observations=dict(episode.observations),
                 actions=_actions(agent, episode),
                 rewards=list(episode.rewards),

@@ -67,7 +67,8 @@ class VecaGymEnv(NotCopied, gymnasium.Env[Observed, Any]):
 
         Args:
             seed: Restarts the count of episodes; None continues it.
-            options: `{"episode": number}` begins the episode of this number.
+            options: `{"episode": number}` begins the episode of this number, `{"world": number}`
+                that of this world of a `VecaEnv`.
 
         Returns:
             The observation, and an info with the entries of that of a step: terms are 0.

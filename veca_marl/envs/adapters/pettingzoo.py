@@ -82,7 +82,8 @@ class VecaParallelEnv(NotCopied, ParallelEnv[str, Observed, Any]):
 
         Args:
             seed: Restarts the count of episodes; None continues it.
-            options: `{"episode": number}` begins the episode of this number.
+            options: `{"episode": number}` begins the episode of this number, `{"world": number}`
+                that of this world of a `VecaEnv`.
 
         Returns:
             Observations, and infos with the entries of those of a step (terms are 0), by agent.

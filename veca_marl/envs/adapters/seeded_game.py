@@ -125,19 +125,23 @@ class SeededGame:
 
         Args:
             seed: Restarts the count of episodes, as `VecaEnv.set_seed`; None continues it.
-            options: `{"episode": number}` begins the episode of this number. Other options are
-                ignored, because PettingZoo's own test passes one.
+            options: `{"episode": number}` begins the episode of this number; `{"world": number}`
+                continues with the episodes of this world of a `VecaEnv`, from 0 on. Other options
+                are ignored, because PettingZoo's own test passes one.
 
         Raises:
             RuntimeError: If the environment is closed.
-            ValueError: If the seed or the number is negative.
+            ValueError: If the seed or a number is negative.
         """
         refuse_closed(self._closed)
         if options is not None and not isinstance(options, Mapping):
             raise ValueError(f"options={options!r} must be a mapping, such as {{'episode': 3}}")
+        chosen = options or {}
         # a refused number leaves the episodes as they are
         episodes = self._episodes if seed is None else Episodes(seed)
-        rng = episodes.next((options or {}).get("episode"))
+        if "world" in chosen:
+            episodes = Episodes(episodes.seed, chosen["world"])
+        rng = episodes.next(chosen.get("episode"))
         self._episodes = episodes
         self.game.reset(rng)
         self._running = True

@@ -167,7 +167,7 @@ class Game:
         ]
         self.actors = [player for player in self.players if player.team not in cfg.script]
         self.task = find_task(cfg.task.name)(cfg.task, self.world, self.players)
-        self._weights = self.task.step_weights()
+        self._weights = self.task.step_weights(cfg.task, cfg.clock)
         self.world.freeze()
         teams = {team.name: team for team in cfg.teams}
         for player in self.players:

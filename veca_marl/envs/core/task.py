@@ -302,12 +302,13 @@ class Task(ABC):
             raise ValueError(f"{name}.rates names {unknown}; its reward terms are {sorted(known)}")
         _check_info(known, players)
 
-    def step_weights(self) -> dict[str, float]:
-        """Return the weight of each reward term in a step of the world's clock, see `rates`."""
-        duration = self.world.clock.step_s / RATE_STEP_S
+    @classmethod
+    def step_weights(cls, cfg: TaskCfg, clock: ClockCfg) -> dict[str, float]:
+        """Return the weight of each reward term in a step of a clock, see `rates`."""
+        duration = clock.step_s / RATE_STEP_S
         return {
-            name: weight * duration if name in self.rates else weight
-            for name, weight in self.cfg.weights.items()
+            name: weight * duration if name in cls.rates else weight
+            for name, weight in cfg.weights.items()
         }
 
     @abstractmethod
