@@ -4,7 +4,9 @@ import random
 import signal
 
 import pytest
-from random_configurations import draw, refusal
+from random_configurations import draw, draw_changes, refusal, refusal_of_changes
+
+from veca_marl.config import compose_node
 
 LONGEST_S = 120
 
@@ -38,6 +40,19 @@ def try_configurations(numbers, time_limit):
 
 def test_some_random_configurations(time_limit):
     try_configurations(range(6), time_limit)
+
+
+def test_some_random_changes_of_a_composed_configuration(time_limit):
+    presets = ["+task=KickTheBall", "playground=house", "senses/touch=parts"]
+    node, rng = compose_node(presets), random.Random(0)
+    for number in range(30):
+        changes = draw_changes(rng, presets)
+        time_limit()
+        try:
+            refusal_of_changes(node, changes, number)
+        except Exception as error:
+            error.add_note(f"change {number}: {' '.join(changes)}")
+            raise
 
 
 @pytest.mark.slow

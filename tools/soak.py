@@ -21,9 +21,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
@@ -38,7 +39,7 @@ from tools.soak_page import Configurations, Parsers, Sample, Soak, page
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.bench.command import machine_line
 from veca_marl.bench.rollouts import ReferenceWorkload
-from veca_marl.config import ConfigError, compose
+from veca_marl.config import ConfigError, compose, compose_node
 from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
@@ -49,6 +50,7 @@ _HELPERS = _ROOT / "tests" / "helpers"
 _STEPS = 300  # of each task in a round
 _OBSERVED_EVERY = 5
 _CONFIGURATION_S = 120
+_CHANGES = 15  # of each set of presets, which Hydra composes once
 _BESIDE = ("parsers", "configurations")
 _LARGEST_BYTES = 8 * 2**30  # address space of what tries configurations: others use the memory too
 _SHARED_MEMORY = Path("/dev/shm")
@@ -214,20 +216,33 @@ def try_configurations(until: float, seed: int) -> Configurations:
     drawn = import_module("random_configurations")
     resource.setrlimit(resource.RLIMIT_AS, (_LARGEST_BYTES, _LARGEST_BYTES))
     signal.signal(signal.SIGALRM, _too_long)
-    found = Configurations()
+    found, number = Configurations(), 1_000_000 * (seed + 1)
     while time.monotonic() < until:
-        number = 1_000_000 * (seed + 1) + found.tried
-        words = drawn.draw(random.Random(number))
-        print(*words, flush=True)  # the last line names what has ended this process
-        signal.alarm(_CONFIGURATION_S)
+        rng, number = random.Random(number), number + 1
+        presets = drawn.draw_presets(rng)
+        words = presets + drawn.draw_changes(rng, presets)
+        _try(found, words, partial(drawn.refusal, words, number))
         try:
-            found.refused += drawn.refusal(words, number) is not None
-        except Exception as error:  # whatever it is, it is reported with its configuration
-            found.failed.append(f"{' '.join(words)}: {type(error).__name__}: {str(error)[:300]}")
-        finally:
-            signal.alarm(0)
-        found.tried += 1
+            node = compose_node(presets)
+        except ConfigError:  # presets that do not fit each other
+            continue
+        for _ in range(_CHANGES):
+            changes = drawn.draw_changes(rng, presets)
+            _try(found, presets + changes, partial(drawn.refusal_of_changes, node, changes, number))
     return found
+
+
+def _try(found: Configurations, words: list[str], refusal: Callable[[], str | None]) -> None:
+    """Count what becomes of a configuration."""
+    print(*words, flush=True)  # the last line names what has ended this process
+    signal.alarm(_CONFIGURATION_S)
+    try:
+        found.refused += refusal() is not None
+    except Exception as error:  # whatever it is, it is reported with its configuration
+        found.failed.append(f"{' '.join(words)}: {type(error).__name__}: {str(error)[:300]}")
+    finally:
+        signal.alarm(0)
+    found.tried += 1
 
 
 def _too_long(*_: object) -> None:

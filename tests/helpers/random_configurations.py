@@ -8,7 +8,9 @@ import torch
 from omegaconf import DictConfig, ListConfig, OmegaConf
 
 import veca_marl
-from veca_marl.config import ConfigError, compose_node
+from veca_marl.config import ConfigError, compose_node, to_config
+from veca_marl.config.stored import change
+from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.plugins import conf_dir
 
 HOSTILE = ["0", "-1", "-0.5", "1e-9", "1e9", "1e308", "nan", "inf", "-inf", "abc", "null", "true"]
@@ -49,6 +51,12 @@ def values(group, preset):
 
 def draw(rng: random.Random):
     """Return overrides: a task, presets, and up to three values that are changed."""
+    presets = draw_presets(rng)
+    return [*presets, *draw_changes(rng, presets)]
+
+
+def draw_presets(rng: random.Random):
+    """Return overrides that choose a task, and presets of some groups."""
     overrides = [f"+task={rng.choice(names('task'))}"]
     for group, chance in (("body", 0.6), ("playground", 0.5), ("clock", 0.15)):
         if rng.random() < chance:
@@ -56,16 +64,21 @@ def draw(rng: random.Random):
     for sense in SENSES:
         if rng.random() < 0.35:
             overrides.append(f"senses/{sense}={rng.choice(names(f'senses/{sense}'))}")
-    for _ in range(rng.choice([0, 1, 1, 1, 1, 2, 2, 3])):
+    return overrides
+
+
+def draw_changes(rng: random.Random, presets, counts=(0, 1, 1, 1, 1, 2, 2, 3)):
+    """Return overrides of values below presets; as many as one of `counts`, or fewer."""
+    changes = []
+    for _ in range(rng.choice(counts)):
         group = rng.choice(GROUPS)
         start = "+task=" if group == "task" else f"{group}="
-        preset = next((text for text in overrides if text.startswith(start)), None)
+        preset = next((text for text in presets if text.startswith(start)), None)
         try:
-            changed = changed_value(rng, *rng.choice(values(group, preset)))
+            changes.append(changed_value(rng, *rng.choice(values(group, preset))))
         except ConfigError:  # the preset does not fit KickTheBall
             continue
-        overrides.append(changed)
-    return overrides
+    return changes
 
 
 def changed_value(rng, key, value):
@@ -103,8 +116,28 @@ def refusal(overrides, seed):
             options["senses"][key.removeprefix("senses/")] = value
         else:
             others.append(text)
+    return _refusal_by(
+        lambda: veca_marl.make(task, worlds=1, seed=seed, overrides=others, **options)
+    )
+
+
+def refusal_of_changes(node, changes, seed):
+    """The same for changes of a composed configuration, as `play` and `evaluate` make them.
+
+    It takes a fraction of the time: Hydra composes nothing.
+    """
+
+    def make():
+        changed = node.copy()
+        change(changed, changes)
+        return VecaEnv(to_config(changed).game, 1, seed)
+
+    return _refusal_by(make)
+
+
+def _refusal_by(make):
     try:
-        env = veca_marl.make(task, worlds=1, seed=seed, overrides=others, **options)
+        env = make()
     except ValueError as error:  # also of a configuration
         if "\n" in str(error):
             raise
