@@ -57,7 +57,7 @@ def test_worlds_whose_client_does_not_come_back_are_ended(cfg):
     with served(cfg, 1, clients=1, reconnect_s=0.5) as server:
         env = torchrl_env(server, 1)
         (process,) = processes(server)
-        with pytest.raises(RemoteError, match=naming("1 clients")):
+        with pytest.raises(RemoteError, match=naming("clients=1")):
             torchrl_env(server, 1)
         env._host._worlds._channel._socket.close(linger=0)  # as if its process had been killed
         wait_until(lambda: not server._sessions)

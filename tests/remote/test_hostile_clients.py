@@ -183,7 +183,7 @@ def test_nobody_gets_the_worlds_of_another_client(server):
     with dealer(server, routing_id=b"c" + bytes(16)) as peer:
         peer.send_multipart(Message(CLOSE, 5).frames())
         peer.send_multipart(Message(STEP, 5, {"worlds": [0], "kinds": ["float32"]}).frames())
-        assert [answer.kind for answer in answers(peer)] == ["refused"]
+        assert [answer.kind for answer in answers(peer)] == ["done", "refused"]  # nothing to end
     assert client in server._sessions
 
 
@@ -192,7 +192,7 @@ def test_more_clients_than_there_may_be(server):
     with ExitStack() as stack:
         for _ in range(3):
             stack.enter_context(closing(gym_env(server)))
-        with pytest.raises(RemoteError, match=naming("all 4 clients")):
+        with pytest.raises(RemoteError, match=naming("clients=4")):
             gym_env(server)
     with closing(gym_env(server)) as env:
         env.reset()

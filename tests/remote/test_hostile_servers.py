@@ -54,7 +54,8 @@ def impostor(answer):
 
 
 def welcome(specs, **changes):
-    return specs.fields() | {"version": __version__, "worlds": 4} | changes
+    places = {"clients": 8, "free": 3}
+    return specs.fields() | {"version": __version__, "worlds": 4} | places | changes
 
 
 def greeting(fields):
@@ -102,6 +103,7 @@ def lies(specs):
     yield from ({"weights": [["kick", float("inf")]]}, {"weights": {"kick": 1.0}}, {"weights": 3})
     yield from ({"worlds": 0}, {"worlds": "8"}, {"worlds": 10**9}, {"version": None}, {"task": 1})
     yield from ({"rate_hz": 0}, {"max_steps": -1}, {"state_size": 10**9}, {"has_goal": 1})
+    yield from ({"clients": 0}, {"clients": None}, {"free": -1}, {"free": 9}, {"free": 1.0})
     yield {"configuration": "x" * 300_000}
 
 

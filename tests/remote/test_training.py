@@ -57,15 +57,15 @@ def test_a_run_learns_the_same_on_a_server(described, tmp_path):
 def test_a_server_with_another_game_is_refused(described):
     other = compose([*GAME[:-1], "task.max_seconds=2.0"]).game
     with pytest.raises(ConfigError, match=naming("max_seconds: 0.8", "max_seconds: 2.0")):
-        ServedGames(described.address).check(other, 2)
+        ServedGames(described.address).check(other, 2, 1)
 
 
 def test_a_server_with_too_few_worlds_is_refused(described, game):
-    ServedGames(described.address).check(game, 2)
+    ServedGames(described.address).check(game, 2, 1)
     with pytest.raises(ConfigError, match="worlds=3"):
-        ServedGames(described.address).check(game, 3)
+        ServedGames(described.address).check(game, 3, 1)
 
 
 def test_a_key_that_cannot_be_read_is_refused(game):
     with pytest.raises(ConfigError, match="nowhere"):
-        ServedGames("tcp://127.0.0.1:9", "nowhere").check(game, 1)
+        ServedGames("tcp://127.0.0.1:9", "nowhere").check(game, 1, 1)

@@ -16,10 +16,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from multiprocessing import parent_process
 from multiprocessing.process import BaseProcess
+from multiprocessing.util import Finalize
 from subprocess import Popen, TimeoutExpired
 from typing import Any
+from weakref import WeakSet
 
 _INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
@@ -47,7 +50,10 @@ def interrupts_blocked() -> Iterator[None]:
 
 
 def ignore_interrupts() -> None:
-    """Let this process ignore Ctrl-C, and end by SIGTERM. Called by a worker at its start."""
+    """Let this process ignore Ctrl-C, and end by SIGTERM. Called by a worker at its start.
+
+    What it owes to others before its end is left to `call_at_the_end`.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
@@ -96,6 +102,48 @@ def prepare_child(parent: int) -> None:
     if hasattr(signal, "SIGCHLD"):
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # the parent's handler is for its children
     end_with_parent(parent)
+
+
+_LAST_CALLS: WeakSet[Finalize[None]] = WeakSet()
+
+
+def call_at_the_end(owner: object, call: Callable[[], None]) -> Finalize[None]:
+    """Call a function once: when an object is dropped, or at the end of this process.
+
+    In a process that `multiprocessing` has started the end is also SIGTERM, by which such processes
+    are ended whose work is done, unless the program handles this signal itself. There is no such
+    call in a process that is killed (SIGKILL).
+
+    Args:
+        owner: The object. `call` must not refer to it, or it is not dropped.
+        call: The function; it may be called in the middle of anything that the main thread does.
+
+    Returns:
+        What calls the function at once, and so for the last time. In a process that was forked
+        from this one it does nothing.
+    """
+    last = Finalize(owner, call, exitpriority=0)
+    _LAST_CALLS.add(last)
+    # not in the first process of a program, whose signals are its own
+    if parent_process() is not None and _sigterm_is_free():
+        signal.signal(signal.SIGTERM, _end_after_last_calls)
+    return last
+
+
+def _sigterm_is_free() -> bool:
+    """Return whether this thread can handle SIGTERM, which nothing else does."""
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    return in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def _end_after_last_calls(number: int, frame: Any) -> None:
+    """Make all last calls, then end by the signal: whoever waits for this process sees it."""
+    signal.signal(number, signal.SIG_IGN)  # a second one would cut them off
+    with ExitStack() as stack:
+        stack.callback(os.kill, os.getpid(), number)
+        stack.callback(signal.signal, number, signal.SIG_DFL)
+        for last in list(_LAST_CALLS):
+            stack.callback(last)
 
 
 def call_when_a_child_ends(call: Callable[[], None]) -> Callable[[], None]:

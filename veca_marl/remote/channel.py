@@ -67,6 +67,7 @@ class Channel:
         self._number = 0
         self._heard = time.monotonic()
         self._met = _Meeting()
+        self._whole = True
         self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)
         for option, value in (
             (zmq.ROUTING_ID, b"c" + secrets.token_bytes(16)),
@@ -104,13 +105,18 @@ class Channel:
         frames = Message(kind, self._number, fields or {}, data).frames()
         self._heard = time.monotonic()
         while True:
-            with suppress(zmq.Again):  # no connection, and the queue is full: it is there
-                self._socket.send_multipart(frames, zmq.NOBLOCK)
+            self._send(frames)
             answer = self._answer(time.monotonic() + RESEND_S)
             if answer is not None:
                 return self._result(answer)
             if time.monotonic() - self._heard > self._timeout_s:
                 raise RemoteError(self._silence())
+
+    def _send(self, frames: list[Any]) -> None:
+        self._whole = False
+        with suppress(zmq.Again):  # no connection, and the queue is full: it is there
+            self._socket.send_multipart(frames, zmq.NOBLOCK)
+        self._whole = True
 
     def _answer(self, until: float) -> Message | None:
         """Return what the server answers to the present request; None if it has not by then."""
@@ -188,14 +194,35 @@ class Channel:
         )
 
     def close(self, kind: str) -> None:
-        """Tell the server that this is the end, and close the connection."""
+        """Tell the server that this is the end, and close the connection.
+
+        It waits shortly for the server to confirm it: then nothing of this client is left there,
+        and this process may end at once.
+        """
         if self._socket.closed:
             return
+        is_there = self._monitor is None or self._met.connected
         self._stop_monitor()
         self._number += 1
         with suppress(zmq.ZMQError):
+            if not self._whole:  # a signal came while a message was sent: the server refuses it
+                self._socket.send(b"", zmq.NOBLOCK)
             self._socket.send_multipart(Message(kind, self._number).frames(), zmq.NOBLOCK)
+            if is_there:
+                self._await_confirmation()
         self._socket.close()
+
+    def _await_confirmation(self) -> None:
+        """Read until the server says something about the last request, for a limited time."""
+        until = time.monotonic() + _LINGER_MS / 1000
+        while (left := until - time.monotonic()) > 0 and self._socket.poll(round(1000 * left)):
+            frames = self._socket.recv_multipart(zmq.NOBLOCK, copy=False)
+            try:
+                message = decode([frame.buffer for frame in frames], LARGEST_ANSWER_HEADER)
+            except ProtocolError:
+                return
+            if message.number == self._number:
+                return
 
 
 @dataclass

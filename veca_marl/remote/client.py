@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.rendering.film import FilmCfg
+from veca_marl.processes.children import call_at_the_end
 from veca_marl.remote import layouts, pictures
 from veca_marl.remote.address import checked_address
 from veca_marl.remote.channel import Channel, RemoteError
@@ -38,10 +40,14 @@ from veca_marl.version import __version__
 TIMEOUT_S = 60.0
 _LARGEST_PICTURE = 16_000_000  # bytes
 _MOST_WORLDS = 10_000
+_MOST_CLIENTS = 10_000
 
 
 class RemoteWorlds:
     """The worlds of one client on a server.
+
+    They end when they are closed or dropped, and with this process unless it is killed: the server
+    has a limited number of places for clients.
 
     The specs come first, by a connection that reads small messages only; the second one reads
     messages that are as large as the specs say, and no larger ones.
@@ -54,6 +60,8 @@ class RemoteWorlds:
     Attributes:
         cfg: What is known of the games.
         most: Number of worlds that the server gives to a client at most.
+        clients: Number of clients that may have worlds there at once.
+        free: Number of those places that were free when this client connected.
         version: Version of veca_marl there.
 
     Raises:
@@ -73,12 +81,13 @@ class RemoteWorlds:
         try:
             self.cfg = RemoteGameCfg(GameSpecs.read(welcome.fields))
             self.most = integer(welcome.fields, "worlds", 1, _MOST_WORLDS)
+            self.clients = integer(welcome.fields, "clients", 1, _MOST_CLIENTS)
+            self.free = integer(welcome.fields, "free", 0, self.clients)
             self._record = layouts.outcome_type(self.cfg.specs)
             self.version = text(welcome.fields, "version")
         except (ProtocolError, ValueError) as error:
             raise RemoteError(f"{address}: {error}") from None
         self._channel: Channel | None = None
-        self._worlds = 0
 
     def _meet(self) -> Message:
         channel = Channel(self._address, self._keys, LARGEST_ANSWER_HEADER, self._timeout_s)
@@ -100,7 +109,7 @@ class RemoteWorlds:
             )
         largest = max(worlds * self._record.itemsize, _LARGEST_PICTURE)
         self._channel = Channel(self._address, self._keys, largest, self._timeout_s)
-        self._worlds = worlds
+        self._end = call_at_the_end(self, partial(self._channel.close, CLOSE))
         try:
             self._channel.ask(OPEN, {"worlds": worlds, "digest": self.cfg.specs.digest})
         except BaseException:
@@ -156,4 +165,4 @@ class RemoteWorlds:
     def close(self) -> None:
         """End the worlds; further calls have no effect."""
         if self._channel is not None:
-            self._channel.close(CLOSE)
+            self._end()

@@ -145,7 +145,11 @@ class Server:
     ) -> None:
         cfg.check(keys is not None)
         self._cfg, self._worlds, self._specs = cfg, worlds, specs
-        self._welcome = specs.fields() | {"version": __version__, "worlds": cfg.worlds}
+        self._welcome = specs.fields() | {
+            "version": __version__,
+            "worlds": cfg.worlds,
+            "clients": cfg.clients,
+        }
         self._sessions: dict[bytes, _Session] = {}
         self._lines: dict[Any, _Session] = {}
         self._ended: OrderedDict[bytes, str] = OrderedDict()
@@ -259,7 +263,8 @@ class Server:
             return refusal(request.number, PEER, f"there is no request {shown(request.kind)}")
         if request.kind == HELLO:
             text(request.fields, "version")
-            return Message(DONE, request.number, self._welcome)
+            free = self._cfg.clients - len(self._sessions)
+            return Message(DONE, request.number, self._welcome | {"free": free})
         session = self._sessions.get(client)
         if session is None:
             return self._without_worlds(client, owner, request)
@@ -268,13 +273,13 @@ class Server:
         session.gone = None
         if request.kind == CLOSE:
             self._end(session, "its client has ended them")
-            return None
+            return Message(DONE, request.number)
         return self._next(session, request, frames)
 
     def _without_worlds(self, client: bytes, owner: str, request: Message) -> Message | None:
         """Return the answer to a client that has no worlds."""
         if request.kind == CLOSE:
-            return None
+            return Message(DONE, request.number)
         if request.kind != OPEN or client in self._ended:
             reason = self._ended.get(client, "the server has been started again, or never had them")
             return refusal(request.number, ENDED, f"the worlds of this client are gone: {reason}")
@@ -282,17 +287,25 @@ class Server:
         if text(request.fields, "digest") != self._specs.digest:
             return refusal(request.number, PEER, "the games here are others by now; connect again")
         if len(self._sessions) >= self._cfg.clients:
-            return refusal(
-                request.number,
-                PEER,
-                f"all {self._cfg.clients} clients that may have worlds at once have some (clients)",
-            )
+            return refusal(request.number, PEER, self._full())
         try:
             self._begin(client, owner, worlds, request.number)
         except OSError as error:  # no memory, processes or files are left
             _LOG.warning("no process can be started: %s", error)
             return refusal(request.number, PEER, f"no process can be started there: {error}")
         return Message(WORKING, request.number)
+
+    def _full(self) -> str:
+        """Return why there is no place for another client, and when there will be one."""
+        lost = sum(session.gone is not None for session in self._sessions.values())
+        kept = (
+            f"; {lost} of them have lost their connection: their worlds end after "
+            f"{self._cfg.reconnect_s:g} s (reconnect_s)"
+        )
+        return (
+            f"{len(self._sessions)} clients have worlds, as many as may have some at once "
+            f"(clients={self._cfg.clients}){kept if lost else ''}"
+        )
 
     def _begin(self, client: bytes, owner: str, worlds: int, number: int) -> None:
         """Start the process of a client."""

@@ -17,6 +17,7 @@ from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg, check_engine
 from veca_marl.algos.collection.host_limits import that_fits
 from veca_marl.algos.demonstrations import Demonstrations
+from veca_marl.algos.evaluation.evaluators import evaluating_processes
 from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.reporting import Reporter, check_installed, make_reporter
 from veca_marl.algos.selfplay import Pool, SelfPlay
@@ -138,7 +139,7 @@ def _assemble(
     """Return the trainer; of a new run, with the parameters that it takes from other runs."""
     if cfg.resume is None or checkpoints.empty:
         init_teams(learners, cfg.init_from, cfg.init_encoders)
-    make_env = _game_factory(cfg)
+    make_env = _game_factory(cfg, collect, learners.need_experience)
     labelled = tuple(t for t, each in learners.algorithms.items() if each.needs_labels)
     return Trainer(
         make_env=make_env,
@@ -304,17 +305,23 @@ def _make_checkpoints(
     )
 
 
-def _game_factory(cfg: Config) -> GameFactory | ServedGames:
+def _game_factory(
+    cfg: Config, collect: CollectCfg, needs_experience: bool
+) -> GameFactory | ServedGames:
     """Return what makes the environments: on this machine, or on a server.
 
     Raises:
-        ConfigError: If the server cannot be reached, or has another game or too few worlds.
+        ConfigError: If the server cannot be reached, or has another game, too few worlds or too few
+            places for the processes of the run.
     """
-    if cfg.collect.server is None:
+    if collect.server is None:
         return GameFactory(cfg.game, tuple(cfg.plugins))
-    served = ServedGames(cfg.collect.server, cfg.collect.key)
-    processes = max(cfg.collect.processes_on(usable_cores()), 1)
-    served.check(cfg.game, max(cfg.collect.all_worlds // processes, cfg.eval.worlds))
+    served = ServedGames(collect.server, collect.key)
+    processes, worlds = collect.processes_on(usable_cores()), cfg.eval.worlds
+    collecting = max(processes, 1)
+    evaluating = max(evaluating_processes(collect.groups, processes, worlds), 1)
+    most_worlds = max(collect.all_worlds // collecting, worlds)
+    served.check(cfg.game, most_worlds, collecting * needs_experience + evaluating)
     return served
 
 

@@ -50,8 +50,13 @@ class ServedGames:
         there = import_remote("client").RemoteWorlds(self.address, self.key)
         return VecaEnv(there.cfg, worlds, seed, host=import_remote("games").RemoteHost(there))
 
-    def check(self, game: GameCfg, worlds: int) -> None:
-        """Check that the server has the games of a configuration, and enough worlds.
+    def check(self, game: GameCfg, worlds: int, clients: int) -> None:
+        """Check that the server has the games of a configuration, and enough worlds and places.
+
+        Args:
+            game: The game.
+            worlds: Worlds that a process needs at most.
+            clients: Processes that have worlds at the same time.
 
         Raises:
             ConfigError: If it has not, or does not serve this client.
@@ -72,4 +77,11 @@ class ServedGames:
             raise ConfigError(
                 f"collect.server={self.address} gives each process {there.most} worlds, and the "
                 f"run needs {worlds}: start the server with worlds={worlds}"
+            )
+        if there.free < clients:
+            raise ConfigError(
+                f"collect.server={self.address} has {there.free} of {there.clients} places for "
+                f"clients free, and the run needs {clients}, one for each process that collects or "
+                "evaluates: wait until others have ended, choose smaller collect.processes, or "
+                f"start the server with larger clients={there.clients}"
             )

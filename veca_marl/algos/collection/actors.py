@@ -30,6 +30,7 @@ from torchrl.collectors.distributed import RayCollector
 from veca_marl.algos.collection.groups import GroupCollector
 from veca_marl.processes.supervision import CHECK_S, Limit, TimeLimit, WorkerError
 
+_CLOSE_S = 2.0  # that actors may take to close their worlds before they are killed
 _SAME = ("veca_marl", "torch", "torchrl", "numpy", "pybullet")
 _QUIET: dict[str, Any] = {
     "include_dashboard": False,
@@ -170,6 +171,10 @@ class SupervisedRayCollector(RayCollector):
 
     def shutdown(self, *args: Any, **kwargs: Any) -> None:
         """End the actors, and Ray's processes if they were started here."""
+        with suppress(RayError):
+            # Ray kills them: they could not tell a server that they need its worlds no longer
+            if closing := [actor.shutdown.remote() for actor in self.remote_collectors]:
+                ray.wait(closing, num_returns=len(closing), timeout=_CLOSE_S)
         with suppress(RayError):
             super().shutdown(*args, **kwargs)
 

@@ -199,6 +199,11 @@ def _split(request: Request, parts: int) -> list[Request]:
     ]
 
 
+def evaluating_processes(parts: int, processes: int, worlds: int) -> int:
+    """Return the number of worker processes of an evaluator, see `make_evaluator`."""
+    return min(parts, processes, worlds)
+
+
 def make_evaluator(
     make_env: EnvFactory,
     players: Players,
@@ -220,8 +225,9 @@ def make_evaluator(
         worlds: Number of worlds of all parts, rounded up to equal numbers.
         limit: See `ParallelEvaluator`; not used without worker processes.
     """
+    processes = evaluating_processes(parts, processes, worlds)
     parts = min(parts, worlds)
     each = math.ceil(worlds / parts)
     if processes == 0:
         return LocalEvaluator(make_env, players, each, parts)
-    return ParallelEvaluator(make_env, players, min(processes, parts), each, parts, limit)
+    return ParallelEvaluator(make_env, players, processes, each, parts, limit)
