@@ -29,7 +29,6 @@ from veca_marl.reports.arms import Arm, compose_arms, compose_sweep
 from veca_marl.reports.figure import check_plotting, draw
 from veca_marl.reports.gather import (
     Found,
-    Row,
     found_in,
     gather,
     planned_rows,
@@ -39,6 +38,7 @@ from veca_marl.reports.gather import (
 from veca_marl.reports.page import Report, page, run_remarks
 from veca_marl.reports.scores import expert_rows, expert_score, runs_of, summarise, team_of
 from veca_marl.reports.verdict import Evidence, judge
+from veca_marl.stored_files import Row
 from veca_marl.sweeps.names import is_sweep, key_of
 
 FIGURE = "curves.png"

@@ -7,11 +7,14 @@ Each function reads plain files only (a pipe would be waited for), up to a size,
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,8 @@ MEGABYTE = 10**6
 _LARGEST_YAML = 256_000  # bytes; the configuration of a run has 15 000
 _LARGEST_JSON = 16 * MEGABYTE
 _LARGEST_TEXT = 1000 * MEGABYTE
+_LARGEST_TABLE = 256 * MEGABYTE  # a million batches of a run have as many
+_LARGEST_WHOLE = 2**64
 _MOST_VALUES = 20_000  # of a YAML file, whose values are read one after the other
 _DEEPEST = 30  # nested lists and mappings
 
@@ -170,3 +175,130 @@ def _values(path: Path, node: Any, key: str = "") -> Iterator[tuple[str, Any]]:
             yield from _values(path, value, f"{key}.{index}")
     else:
         yield key, node
+
+
+Row = dict[str, str]
+"""Cells of a row of a table by the names of their columns."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns of a CSV file that are known by name; all others have a number or nothing.
+
+    Attributes:
+        whole: Columns that have to be there, with a whole number in each row.
+        numbers: Columns that have to be there, with a number in each row.
+        words: Columns that have to be there, with words.
+        may_be_whole: Columns that may be absent, with a whole number or nothing.
+        may_be_words: Columns that may be absent, with words.
+    """
+
+    whole: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
+    may_be_whole: tuple[str, ...] = ()
+    may_be_words: tuple[str, ...] = ()
+
+    def check(self, path: Path, names: Iterable[str], rows: Iterable[Row]) -> None:
+        """Check the head of a table and its cells.
+
+        Raises:
+            StoredFileError: If a column is absent, or a cell has something else.
+        """
+        known = set(names)
+        for name in (*self.whole, *self.numbers, *self.words):
+            if name not in known:
+                raise StoredFileError(path, f"no column {name!r}")
+        for number, row in enumerate(rows, start=1):
+            for name, cell in row.items():
+                if reason := self._reason(name, cell):
+                    raise StoredFileError(path, f"row {number}, column {name!r}: {reason}")
+
+    def _reason(self, name: str, cell: str) -> str:
+        """Return why a column cannot have a cell; empty if it can."""
+        if name in self.words or name in self.may_be_words:
+            return ""
+        if not cell and name not in self.whole and name not in self.numbers:
+            return ""
+        if name in self.whole or name in self.may_be_whole:
+            return "" if _is_whole(cell) else f"{cell[:80]!r} is not a whole number"
+        return "" if _is_number(cell) else f"{cell[:80]!r} is not a number"
+
+
+def _is_whole(cell: str) -> bool:
+    return cell.isdecimal() and len(cell) <= 20 and int(cell) < _LARGEST_WHOLE
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def read_table(path: Path, columns: Columns) -> list[Row]:
+    """Return the rows of a CSV file.
+
+    Raises:
+        StoredFileError: If it cannot be read, has other columns or cells, or a row has another
+            number of cells than the head.
+    """
+    names, rows = read_cells(path)
+    return _complete(path, columns, names, rows)
+
+
+def read_growing_table(path: Path, columns: Columns) -> list[Row]:
+    """Return the rows of a CSV file to which a run appends, without a last one that is cut off.
+
+    The run is writing it, or was ended in the middle.
+
+    Raises:
+        StoredFileError: See `read_table`.
+    """
+    names, rows = read_cells(path)
+    if rows and None in rows[-1].values():
+        rows.pop()
+    return _complete(path, columns, names, rows)
+
+
+def _complete(path: Path, columns: Columns, names: list[str], rows: list[Any]) -> list[Row]:
+    for number, row in enumerate(rows, start=1):
+        if None in row or None in row.values():
+            raise StoredFileError(path, f"row {number} has another number of cells than the head")
+    columns.check(path, names, rows)
+    return rows
+
+
+def read_cells(path: Path) -> tuple[list[str], list[dict[Any, Any]]]:
+    """Return the head and the rows of a CSV file, whatever they are; see `cells_in`."""
+    return cells_in(path, read_table_text(path))
+
+
+def read_table_text(path: Path) -> str:
+    """Return the text of a CSV file.
+
+    Raises:
+        StoredFileError: If it cannot be read, or is larger than any that a run writes.
+    """
+    return read_text(path, _LARGEST_TABLE)
+
+
+def cells_in(path: Path, text: str) -> tuple[list[str], list[dict[Any, Any]]]:
+    """Return the head and the rows in the text of a CSV file.
+
+    Cells that a row lacks are None; what it has more than the head is a list beside the key None.
+
+    Args:
+        path: The file, for errors.
+        text: Its text, or the beginning of it.
+
+    Raises:
+        StoredFileError: If it is no CSV, or has longer cells than `csv` reads.
+    """
+    reader = csv.DictReader(StringIO(text, newline=""))
+    try:
+        rows = list(reader)
+    except csv.Error as error:
+        raise StoredFileError(path, f"line {reader.line_num}: {error}") from error
+    return list(reader.fieldnames or ()), rows

@@ -39,6 +39,9 @@ EVALUATIONS = "frames,player,team,episodes,return\n0,random,agents,32,-0.5\n"
             "row 2 has another number of cells than the head",
         ),
         ("metrics.csv", b"frames,frames_per_s\n100,\n", "row 1, column 'frames_per_s': ''"),
+        ("metrics.csv", b"frames,frames_per_s\n" + b"1" * 2**18, "field"),
+        ("evaluations.csv", f"{EVALUATIONS}-100,policy,agents,8,1\n".encode(), "'-100'"),
+        ("evaluations.csv", f"{EVALUATIONS}100,policy,agents,few,1\n".encode(), "'few'"),
     ],
 )
 def test_a_damaged_file_is_named_with_the_reason(tmp_path, arms, file, content, reason):

@@ -72,6 +72,61 @@ def test_a_damaged_progress_is_named(tmp_path, content):
         plan(job(tmp_path / "run"))
 
 
+HEAD = "frames,player,team,episodes,return\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("player,team,return\npolicy,agents,1.0\n", "frames"),
+        (f"{HEAD}many,policy,agents,32,1.0\n", "many"),
+        (f"{HEAD}200,policy,agents,32,high\n", "high"),
+        (f"{HEAD}100,policy\n200,policy,agents,32,1.0\n", "row 1"),
+        (f"{HEAD}200,policy,{'a' * 2**18},32,1.0\n", "limit"),
+        (f"{HEAD}1{'0' * 5000},policy,agents,32,1.0\n", "frames"),
+        ("\0", "frames"),
+    ],
+)
+def test_a_damaged_table_is_named(tmp_path, content, named):
+    """A run of version 0.2 is judged by it."""
+    folder = tmp_path / "run"
+    write_run(folder, CONFIG, [(200, 1.0)])
+    (folder / "progress.json").unlink()
+    (folder / "evaluations.csv").write_text(content)
+    with pytest.raises(SweepError, match=naming(folder / "evaluations.csv", named)):
+        plan(job(folder))
+
+
+def test_a_table_that_is_too_large_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("veca_marl.stored_files._LARGEST_TABLE", 1000)
+    folder = tmp_path / "run"
+    write_run(folder, CONFIG, [(200, 1.0)])
+    (folder / "progress.json").unlink()
+    assert plan(job(folder)).action is Action.skip
+    with (folder / "evaluations.csv").open("a") as table:
+        table.write("200,policy,agents,32,1.0\n" * 100)
+    with pytest.raises(SweepError, match=naming(folder / "evaluations.csv", "MB")):
+        plan(job(folder))
+
+
+def test_a_row_that_is_being_written_is_not_counted(tmp_path):
+    folder = tmp_path / "run"
+    write_run(folder, CONFIG, [(100, 1.0)])
+    (folder / "progress.json").unlink()
+    with (folder / "evaluations.csv").open("a") as table:
+        table.write("200,policy")
+    assert plan(job(folder)).action is Action.resume
+
+
+@pytest.mark.parametrize("frames", [None, "many", float("inf")])
+def test_a_damaged_budget_is_named(tmp_path, frames):
+    write_run(
+        tmp_path / "run", {**CONFIG, "total_frames": frames, "max_minutes": 1.0}, [(100, 1.0)]
+    )
+    with pytest.raises(SweepError, match=naming(tmp_path / "run" / "config.yaml", "total_frames")):
+        plan(job(tmp_path / "run", max_minutes=1.0))
+
+
 def test_a_run_that_was_interrupted_is_continued(tmp_path):
     write_run(tmp_path / "run", CONFIG, [(100, 1.0)], ended=False)
     made = plan(job(tmp_path / "run"))

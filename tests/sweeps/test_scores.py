@@ -43,6 +43,7 @@ def test_the_score_is_that_of_the_last_evaluation_of_the_policy(rows, metric, te
         (WITH_BLUE, "return", None, "red"),
         (ROWS, "return", "green", "green"),
         (ROWS, "falls", None, "falls"),
+        (ROWS, "player", None, "kick"),
         (WITH_BLUE, "kick", "blue", "kick"),
     ],
 )

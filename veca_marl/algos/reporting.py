@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from torchrl.record.loggers import Logger, MLFlowLogger, TensorboardLogger, WandbLogger
 
 from veca_marl.algos.files import WriteError, open_to_append, write_atomically, write_errors
-from veca_marl.stored_files import read_text
+from veca_marl.stored_files import cells_in, read_cells, read_table_text
 
 _LOG = logging.getLogger(__name__)
 
@@ -226,15 +226,16 @@ def _columns(path: Path) -> list[str]:
     if not path.exists():
         return []
     with _table_errors(path):
-        return next(csv.reader(StringIO(read_text(path), newline="")), [])
+        names, _ = read_cells(path)
+        return names
 
 
 def _add_columns(path: Path, names: Sequence[str]) -> None:
     """Add columns to a table, which are blank in its rows."""
     with _table_errors(path):
-        reader = csv.DictReader(StringIO(read_text(path), newline=""))
-        rows = list(reader)
-    write_atomically(path, _table([*(reader.fieldnames or []), *names], rows, header=True))
+        before, rows = read_cells(path)
+        text = _table([*before, *names], rows, header=True)
+    write_atomically(path, text)
 
 
 def _cell(value: float | int | str) -> str | int:
@@ -259,7 +260,7 @@ def _table_errors(path: Path) -> Iterator[None]:
     """Raise `WriteError` where a stored table cannot be read: it is to be continued."""
     try:
         yield
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
+    except (KeyError, TypeError, ValueError) as error:
         reason = str(error) if isinstance(error, ValueError) else repr(error)
         named = reason if str(path) in reason else f"{path} is damaged ({reason})"
         raise WriteError(f"{named}: move it away to continue") from error
@@ -273,15 +274,15 @@ def _kept_rows(path: Path, frames: int) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     with _table_errors(path):
-        whole, end, _ = read_text(path).rpartition("\n")
+        whole, end, _ = read_table_text(path).rpartition("\n")
         if frames and not end:
             raise ValueError("no line is complete")
-        reader = csv.DictReader(whole.splitlines())
-        kept = [row for row in reader if frames and int(row["frames"]) <= frames]
+        names, rows = cells_in(path, whole)
+        kept = [row for row in rows if frames and int(row["frames"]) <= frames]
         if any(None in row or None in row.values() for row in kept):
             raise ValueError("a row has another number of cells than the head")
     if kept:
-        write_atomically(path, _table(reader.fieldnames or [], kept, header=True))
+        write_atomically(path, _table(names, kept, header=True))
     else:
         path.unlink()
     return kept

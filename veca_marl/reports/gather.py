@@ -16,13 +16,17 @@ import numpy as np
 from veca_marl.algos.files import write_atomically
 from veca_marl.reports.arms import FrameBudget
 from veca_marl.runs.continuation import may_change
-from veca_marl.stored_files import read_json, read_text
+from veca_marl.stored_files import Columns, Row, StoredFileError, read_json, read_table
 from veca_marl.sweeps.differences import differences, key_patterns
-from veca_marl.sweeps.run_state import RunState, StoredRun, read_run
+from veca_marl.sweeps.run_state import TABLES, RunState, StoredRun, read_run
 
 _CONFIG_KEYS = ("task", "seed", "total_frames")  # of every version
-_NUMBERS = {"evaluations": ("frames",), "metrics": ("frames", "frames_per_s")}
-_WORDS = {"evaluations": ("player", "team"), "metrics": ()}
+_RESULTS = Columns(
+    whole=("seed", "frames"),
+    words=("arm", "player", "team"),
+    may_be_whole=("episodes",),
+    may_be_words=("state", "commit", "remark"),
+)
 
 
 class DamagedRunError(ValueError):
@@ -43,10 +47,9 @@ def read_checked_run(folder: Path) -> tuple[StoredRun, str]:
         if run.config is None:
             return run, ""
         _check_keys(run.config)
-    for kind, numbers in _NUMBERS.items():
-        path = folder / f"{kind}.csv"
-        with _read_errors(path):
-            _check_table(path, numbers, _WORDS[kind])
+    for kind in TABLES:
+        with _read_errors(folder / f"{kind}.csv"):
+            run.rows(kind)
     path = folder / "provenance.json"
     with _read_errors(path):
         return run, _commit(path)
@@ -57,7 +60,7 @@ def _read_errors(path: Path) -> Iterator[None]:
     """Turn errors of reading a file into one sentence that names it, or another file beside it."""
     try:
         yield
-    except (ValueError, OSError, csv.Error) as error:
+    except (ValueError, OSError) as error:
         reason = " ".join(str(error).split())
         named = str(path.parent) in reason
         raise DamagedRunError(reason if named else f"{path}: {reason}") from error
@@ -70,45 +73,6 @@ def _check_keys(config: dict[str, Any]) -> None:
         raise ValueError(f"no key {absent[0]!r}")
 
 
-def _check_table(path: Path, numbers: Sequence[str], words: Sequence[str]) -> None:
-    """Check that a table has its columns, complete rows and numbers.
-
-    Args:
-        path: The CSV file, which may be missing.
-        numbers: Columns with a number in each row.
-        words: Columns without numbers; all others have a number or nothing.
-    """
-    if not path.is_file():
-        return
-    reader = csv.DictReader(StringIO(read_text(path), newline=""))
-    columns = reader.fieldnames or ()
-    rows: list[dict[Any, Any]] = list(reader)
-    absent = [name for name in (*numbers, *words) if name not in columns]
-    if absent:
-        raise ValueError(f"no column {absent[0]!r}")
-    if rows and None in rows[-1].values():
-        rows.pop()  # a run is writing it, or was ended in the middle
-    for number, row in enumerate(rows, start=1):
-        _check_stored_row(row, f"row {number}", numbers, words)
-
-
-def _check_stored_row(
-    row: dict[Any, Any], name: str, numbers: Sequence[str], words: Sequence[str]
-) -> None:
-    if None in row or None in row.values():
-        raise ValueError(f"{name} has another number of cells than the head")
-    for column, cell in row.items():
-        if column not in words and (cell or column in numbers):
-            _check_number(cell, f"{name}, column {column!r}", whole=column == "frames")
-
-
-def _check_number(cell: str, name: str, whole: bool) -> None:
-    try:
-        int(cell) if whole else float(cell)
-    except ValueError:
-        raise ValueError(f"{name}: {cell!r} is not a {'whole ' * whole}number") from None
-
-
 def _commit(path: Path) -> str:
     if not path.is_file():
         return ""
@@ -118,9 +82,6 @@ def _commit(path: Path) -> str:
     if not (commit := stored.get("commit") or version):
         raise ValueError("names neither a commit nor a version of veca_marl")
     return str(commit)
-
-
-Row = dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -368,27 +329,12 @@ def read_rows(path: Path) -> list[Row]:
     """Return the rows of a file that `write_rows` wrote.
 
     Raises:
-        ValueError: If a column that a report needs is missing, or a row is damaged.
+        StoredFileError: If a column that a report needs is missing, or a row is damaged.
     """
-    with path.open(newline="") as file:
-        reader = csv.DictReader(file)
-        columns = set(reader.fieldnames or ())
-        absent = sorted({"arm", "seed", "frames", "player", "team"} - columns)
-        if absent:
-            raise ValueError(f"{path} has no column {absent[0]!r}; it is no table of results")
-        rows = list(reader)
-    for line, row in enumerate(rows, 2):
-        _check_row(path, line, row)
+    rows = read_table(path, _RESULTS)
+    states = [state.value for state in RunState]
+    for number, row in enumerate(rows, start=1):
+        if row.get("state") and row["state"] not in states:
+            reason = f"row {number}: state {row['state'][:80]!r}; choices: {', '.join(states)}"
+            raise StoredFileError(path, reason)
     return rows
-
-
-def _check_row(path: Path, line: int, row: Mapping[str | None, object]) -> None:
-    """Raise `ValueError` for a row that was cut, or that no run can have."""
-    if None in row or None in row.values():
-        raise ValueError(f"{path}, line {line}: the row has another number of cells than the first")
-    state, states = row.get("state"), [state.value for state in RunState]
-    if state and state not in states:
-        raise ValueError(f"{path}, line {line}: state {state!r}; choices: {', '.join(states)}")
-    for name in ("seed", "frames"):
-        if not str(row[name]).isdecimal():
-            raise ValueError(f"{path}, line {line}: {name} {row[name]!r} is no whole number")

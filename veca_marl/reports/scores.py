@@ -17,8 +17,9 @@ from veca_marl.envs.adapters.torchrl import ExpertPolicy
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.core.expert import find_expert, has_expert, missing_needs
 from veca_marl.reports.arms import Arm, FrameBudget
-from veca_marl.reports.gather import Row, state_in
+from veca_marl.reports.gather import state_in
 from veca_marl.reports.statistics import Interval, Scores, bootstrap_interval, interquartile_mean
+from veca_marl.stored_files import Row
 
 NEVER = 1e18
 """Frames to a threshold that a run has not reached; finite, so that differences are defined."""

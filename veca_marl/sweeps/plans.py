@@ -88,13 +88,14 @@ def plan(job: Job) -> Plan:
     """
     try:
         stored = read_run(job.folder)
+        state = stored.state(job.frames, job.asked["max_minutes"])
     except ValueError as error:
         raise SweepError(str(error)) from error
     if stored.config is None:
         own = [*job.overrides, f"hydra.run.dir={quoted(job.folder)}", _QUIET]
         return Plan(job, Action.start, (*_TRAIN, *own))
     changed = _changed(job, stored)
-    if stored.state(job.frames, job.asked["max_minutes"]) in (RunState.finished, RunState.cut):
+    if state in (RunState.finished, RunState.cut):
         return Plan(job, Action.skip)
     own = [f"resume={quoted(job.folder)}", _QUIET, *map(_override, changed)]
     return Plan(job, Action.resume, (*_TRAIN, *own))

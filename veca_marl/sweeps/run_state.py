@@ -6,20 +6,32 @@ are different bodies: their names are compared with the numbers.
 
 from __future__ import annotations
 
-import csv
+import math
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from enum import Enum
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from veca_marl.migrations import VersionError, migrated
 from veca_marl.runs.continuation import RunProgress, read_progress
-from veca_marl.stored_files import StoredFileError, read_json, read_text, read_yaml
+from veca_marl.stored_files import (
+    Columns,
+    Row,
+    StoredFileError,
+    read_growing_table,
+    read_json,
+    read_yaml,
+)
 
 _KEY = "registered_name"
+_LABELS = ("frames", "player", "team")  # columns that are no measurements
+TABLES = {
+    "evaluations": Columns(whole=("frames",), words=("player", "team"), may_be_whole=("episodes",)),
+    "metrics": Columns(whole=("frames",), numbers=("frames_per_s",)),
+}
+"""The tables of a run by the names of their files, and the columns that are read by name."""
 
 
 def with_body_kinds(plain: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
@@ -84,22 +96,26 @@ class StoredRun:
 
     @property
     def progress(self) -> RunProgress:
-        """Where it stands; for a run of version 0.2, which has no such file, by its other files."""
+        """Where it stands; for a run of version 0.2, which has no such file, by its other files.
+
+        Raises:
+            StoredFileError: See `rows`.
+        """
         if self.stored_progress is not None:
             return self.stored_progress
         evaluated = (int(row["frames"]) for row in self.rows("evaluations"))
         return RunProgress(max(evaluated, default=0), (self.folder / "comparison.txt").is_file())
 
-    def rows(self, kind: str) -> list[dict[str, str]]:
+    def rows(self, kind: str) -> list[Row]:
         """Return the complete rows of ``evaluations.csv`` or ``metrics.csv``; none without a file.
 
         The last row is incomplete while a run writes it.
+
+        Raises:
+            StoredFileError: If the file is damaged.
         """
         path = self.folder / f"{kind}.csv"
-        if not path.is_file():
-            return []
-        table = csv.DictReader(StringIO(read_text(path), newline=""))
-        return [row for row in table if None not in row.values()]
+        return read_growing_table(path, TABLES[kind]) if path.is_file() else []
 
     def state(self, total_frames: int, max_minutes: float | None) -> RunState:
         """Return how far it has come on the way to a budget.
@@ -107,6 +123,9 @@ class StoredRun:
         Args:
             total_frames: Frames that it is to have.
             max_minutes: Minutes that it may take; None for no limit.
+
+        Raises:
+            StoredFileError: If a file that says it is damaged.
         """
         if self.config is None:
             return RunState.missing
@@ -116,7 +135,10 @@ class StoredRun:
         if progress.frames >= total_frames:
             return RunState.finished
         # one that had all frames of its own budget was not cut by the time
-        of_its_own = int(self.config.get("total_frames", total_frames))
+        of_its_own = self.config.get("total_frames", total_frames)
+        if not (isinstance(of_its_own, (int, float)) and math.isfinite(of_its_own)):
+            reason = f"total_frames={of_its_own!r} is no number of frames"
+            raise StoredFileError(self.folder / "config.yaml", reason)
         limited = max_minutes is not None and self.config.get("max_minutes") == max_minutes
         return RunState.cut if limited and progress.frames < of_its_own else RunState.unfinished
 
@@ -140,8 +162,8 @@ def final_score(rows: Iterable[Mapping[str, Any]], experiment: Mapping[str, Any]
         raise ValueError(f"experiment.team={asked}: choices: {', '.join(teams)}")
     last = [row for row in of_policy if asked in (None, row["team"])][-1]
     metric = experiment["metric"]
-    if last.get(metric) in (None, ""):
-        choices = ", ".join(key for key in last if key not in ("frames", "player", "team"))
+    if metric in _LABELS or last.get(metric) in (None, ""):
+        choices = ", ".join(key for key in last if key not in _LABELS)
         raise ValueError(f"experiment.metric={metric}: choices: {choices}")
     return float(last[metric])
 

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO, TextIO
 from veca_marl.processes.children import end_all, end_of
 from veca_marl.processes.cores import CORES
 from veca_marl.runs.continuation import read_progress
+from veca_marl.stored_files import read_table_text
 from veca_marl.sweeps.plans import Action, Job, Plan, SweepError, plan
 
 _INTERVAL_TERMINAL_S = 2.0
@@ -40,7 +41,7 @@ def _frames_stored(folder: Path) -> int:
     if not path.is_file():
         stored = read_progress(folder)
         return 0 if stored is None else stored.frames
-    lines = path.read_text().splitlines()
+    lines = read_table_text(path).splitlines()
     first = lines[-1].partition(",")[0] if lines else ""
     return int(first) if first.isdigit() else 0
 

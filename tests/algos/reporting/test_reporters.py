@@ -114,7 +114,14 @@ def test_a_header_that_was_cut_off_is_written_again(tmp_path, text):
 
 
 @pytest.mark.parametrize(
-    "text", ["10,1.5\n20,2.5\n", "frames,a/return\nx,1.5\n", "frames,a/ret", ""]
+    "text",
+    [
+        "10,1.5\n20,2.5\n",
+        "frames,a/return\nx,1.5\n",
+        "frames,a/ret",
+        "",
+        f"frames,a/return\n10,{'1' * 2**18}\n",
+    ],
 )
 def test_a_damaged_table_is_named_and_kept(tmp_path, text):
     path = tmp_path / "metrics.csv"
@@ -122,6 +129,16 @@ def test_a_damaged_table_is_named_and_kept(tmp_path, text):
     with pytest.raises(WriteError, match=naming(path)):
         CsvReporter(tmp_path, resumed_frames=20)
     assert path.read_text() == text
+
+
+def test_a_table_that_is_damaged_during_a_run_is_named(tmp_path):
+    path = tmp_path / "metrics.csv"
+    reporter = CsvReporter(tmp_path)
+    reporter.write("metrics", 10, {"a/return": 1.5})
+    with path.open("a") as table:
+        table.write("20,1.5,2.5\n")
+    with pytest.raises(WriteError, match=naming(path)):
+        reporter.write("metrics", 30, {"a/return": 1.5, "a/new": 0.5})
 
 
 @pytest.mark.parametrize("resumed", [False, True])
