@@ -16,7 +16,6 @@ from veca_marl.algos.algorithm import make_algorithm
 from veca_marl.algos.checkpoints import Checkpoints, Identity
 from veca_marl.algos.collection.experience import CollectCfg, check_engine
 from veca_marl.algos.collection.host_limits import that_fits
-from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.evaluation.evaluators import evaluating_processes
 from veca_marl.algos.networks.encoders import Precision
 from veca_marl.algos.reporting import Reporter, check_installed, make_reporter
@@ -34,7 +33,7 @@ from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.plugins import load_plugins
 from veca_marl.processes.cores import usable_cores
 from veca_marl.runs.continuation import RESUMABLE, is_default
-from veca_marl.runs.demonstrations import open_demonstrations
+from veca_marl.runs.demonstrations import give_demonstrations
 from veca_marl.runs.run_folder import RunFolder
 from veca_marl.runs.served_worlds import ServedGames
 
@@ -105,7 +104,7 @@ def make_trainer(cfg: Config, folder: RunFolder | None = None) -> Trainer:
     specs = read_specs(cfg.game)
     learners = make_learners(cfg, specs, device)
     _log_storage(learners)
-    _give_demonstrations(cfg, folder, specs, learners)
+    give_demonstrations(cfg, folder, specs, learners)
     checkpoints = _make_checkpoints(cfg, folder, specs)
     collect, changed = that_fits(cfg.collect, specs)
     if changed:
@@ -154,61 +153,6 @@ def _assemble(
         progress_bar=cfg.log.progress_bar,
         episode_steps=cfg.game.max_steps,
     )
-
-
-def _give_demonstrations(
-    cfg: Config,
-    folder: RunFolder | None,
-    specs: Mapping[str, TeamSpec],
-    learners: TeamLearners,
-) -> None:
-    """Let the algorithms of all teams learn from the demonstrations, if there are any.
-
-    Raises:
-        ConfigError: If there are none where they are needed, an algorithm cannot learn from them,
-            they cannot be read, do not fit, or are not those that a resumed run began with.
-    """
-    for team, algorithm in learners.algorithms.items():
-        name = learners.cfgs[team].name
-        if algorithm.needs_demonstrations and cfg.demonstrations is None:
-            raise ConfigError(
-                f"algo={name} learns from demonstrations: record some with python -m "
-                "veca_marl.demonstrations, and add demonstrations=FOLDER"
-            )
-        if not algorithm.needs_experience and team in learners.bonuses:
-            raise ConfigError(
-                f"algo={name} collects no experience that intrinsic rewards could be added to"
-            )
-        if algorithm.needs_labels:
-            _require_expert(cfg, name, team)
-    if cfg.demonstrations is None:
-        return
-    found = open_demonstrations(cfg.demonstrations, cfg.game, specs, list(learners.algorithms))
-    if cfg.resume is not None and folder is not None:
-        _check_same_demonstrations(found, folder)
-    try:
-        for algorithm in learners.algorithms.values():
-            algorithm.take_demonstrations(found)
-    except ValueError as error:
-        raise ConfigError(f"demonstrations={cfg.demonstrations}: {one_line(error)}") from error
-
-
-def _check_same_demonstrations(found: Demonstrations, folder: RunFolder) -> None:
-    """Raise `ConfigError` if a run began with other demonstrations than those in their folder."""
-    before = folder.demonstrations
-    if before not in (None, found.card.checksum):
-        raise ConfigError(
-            f"demonstrations={found.folder}: the {len(found)} episodes there are not those that "
-            f"{folder.path} began with (extended, or recorded anew); begin a new run with them"
-        )
-
-
-def _require_expert(cfg: Config, algo: str, team: str) -> None:
-    """Raise `ConfigError` if the expert of the task cannot label what a team observes."""
-    try:
-        LabelledEnv(cfg.game, 1, 0, teams=[team]).close()
-    except ValueError as error:
-        raise ConfigError(f"algo={algo}: {one_line(error)}") from error
 
 
 def _self_play(cfg: Config, folder: RunFolder | None, learners: TeamLearners) -> SelfPlay:

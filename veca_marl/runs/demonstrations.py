@@ -8,10 +8,13 @@ from pathlib import Path
 from veca_marl.algos.demonstration_files import DemonstrationsError, TeamForm
 from veca_marl.algos.demonstrations import Demonstrations
 from veca_marl.algos.specs import TeamSpec
-from veca_marl.config import ConfigError
+from veca_marl.algos.training.learners import TeamLearners
+from veca_marl.config import Config, ConfigError, one_line
+from veca_marl.envs.adapters.torchrl.labelled import LabelledEnv
 from veca_marl.envs.core.benchmark import parameters
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.task import find_task
+from veca_marl.runs.run_folder import RunFolder
 
 
 def team_forms(game: GameCfg, specs: Mapping[str, TeamSpec]) -> dict[str, TeamForm]:
@@ -32,6 +35,61 @@ def team_forms(game: GameCfg, specs: Mapping[str, TeamSpec]) -> dict[str, TeamFo
             {name: parameters(senses.of(name)) for name in names[team] if senses.of(name).present},
         )
     return forms
+
+
+def give_demonstrations(
+    cfg: Config,
+    folder: RunFolder | None,
+    specs: Mapping[str, TeamSpec],
+    learners: TeamLearners,
+) -> None:
+    """Let the algorithms of all teams learn from the demonstrations, if there are any.
+
+    Raises:
+        ConfigError: If there are none where they are needed, an algorithm cannot learn from them,
+            they cannot be read, do not fit, or are not those that a resumed run began with.
+    """
+    for team, algorithm in learners.algorithms.items():
+        name = learners.cfgs[team].name
+        if algorithm.needs_demonstrations and cfg.demonstrations is None:
+            raise ConfigError(
+                f"algo={name} learns from demonstrations: record some with python -m "
+                "veca_marl.demonstrations, and add demonstrations=FOLDER"
+            )
+        if not algorithm.needs_experience and team in learners.bonuses:
+            raise ConfigError(
+                f"algo={name} collects no experience that intrinsic rewards could be added to"
+            )
+        if algorithm.needs_labels:
+            _require_expert(cfg, name, team)
+    if cfg.demonstrations is None:
+        return
+    found = open_demonstrations(cfg.demonstrations, cfg.game, specs, list(learners.algorithms))
+    if cfg.resume is not None and folder is not None:
+        _check_same_demonstrations(found, folder)
+    try:
+        for algorithm in learners.algorithms.values():
+            algorithm.take_demonstrations(found)
+    except ValueError as error:
+        raise ConfigError(f"demonstrations={cfg.demonstrations}: {one_line(error)}") from error
+
+
+def _check_same_demonstrations(found: Demonstrations, folder: RunFolder) -> None:
+    """Raise `ConfigError` if a run began with other demonstrations than those in their folder."""
+    before = folder.demonstrations
+    if before not in (None, found.card.checksum):
+        raise ConfigError(
+            f"demonstrations={found.folder}: the {len(found)} episodes there are not those that "
+            f"{folder.path} began with (extended, or recorded anew); begin a new run with them"
+        )
+
+
+def _require_expert(cfg: Config, algo: str, team: str) -> None:
+    """Raise `ConfigError` if the expert of the task cannot label what a team observes."""
+    try:
+        LabelledEnv(cfg.game, 1, 0, teams=[team]).close()
+    except ValueError as error:
+        raise ConfigError(f"algo={algo}: {one_line(error)}") from error
 
 
 def open_demonstrations(
