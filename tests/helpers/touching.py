@@ -9,7 +9,7 @@ from stand_in_worlds import SceneWorld
 from veca_marl.sim.body.anatomy import REFERENCE, Growth, load_skeleton
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.touch import TouchCfg, TouchSense, load_taxels, taxel_positions
-from veca_marl.sim.touch.touch_sense import overlapping_triangles, unsensed_primitives
+from veca_marl.sim.touch.touch_sense import own_overlaps, unsensed_primitives
 
 FIELD = TouchCfg().receptive_field
 # arms away from the trunk: nothing of the body touches the body
@@ -96,7 +96,7 @@ def _against(stage, bone, g):
     normals = np.broadcast_to(normals, bases.shape)
     radii = np.repeat(FIELD * of_index(taxels.gaps, bone)[:, None], 6, axis=1)
     if geoms.objects[g] == stage.body.id:
-        radii[of_index(overlapping_triangles(FIELD), bone)] = 0.0
+        radii[of_index(own_overlaps(FIELD).triangles, bone)] = 0.0
     thing = _pressing(geoms, g, inset)
     readings = np.zeros(bases.shape[:2])
     close = thing.distance(bases) < np.hypot(length, radii)

@@ -269,6 +269,6 @@ def readings_of(stage, taxels, share):
     bones = rigid_bones(geoms, body, 47)
     readings = np.zeros(taxels.depths.shape)
     workspace = empty_workspace(taxels, len(vertices), len(geoms.shapes))
-    fields, ignored = fields_of(taxels, share, body.id), unsensed_primitives(geoms, body)
+    fields, ignored = fields_of(taxels, share, body), unsensed_primitives(geoms, body)
     read_taxels(taxels, fields, vertices, geoms, bones, ignored, workspace, readings)
     return readings

@@ -89,7 +89,7 @@ class FlatSkin:
         self._geoms = scene.geoms
         self._own = rigid_bones(self._geoms, skin, 1)
         self._taxels = _one_triangle(thickness_m)
-        self._fields = Fields(np.full((2, 1), radius_m), np.full(2, radius_m), skin.id)
+        self._fields = Fields(np.full((2, 1), radius_m), np.full(2, radius_m), skin.id, 0)
         self._ignored = np.array([[True, False]])
         self._workspace = empty_workspace(self._taxels, len(_CORNERS), len(self._geoms.shapes))
         self._readings = np.zeros((1, TAXELS_PER_TRIANGLE))

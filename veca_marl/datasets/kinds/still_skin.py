@@ -29,7 +29,7 @@ from veca_marl.sim.touch.taxels import (
     load_taxels,
     taxel_positions,
 )
-from veca_marl.sim.touch.touch_sense import overlapping_triangles, unsensed_primitives
+from veca_marl.sim.touch.touch_sense import own_overlaps, unsensed_primitives
 
 Bytes = NDArray[np.uint8]
 
@@ -103,10 +103,8 @@ class StillSkin:
         self._body = self._scene.objects[0]
         self._thing = self._scene.add_object("thing", [thing])
         self._body.positions[:], self._body.rotations[:] = poses.positions, poses.rotations
-        overlapping = overlapping_triangles(cfg.receptive_field)
-        self._fields: Fields = fields_of(
-            self._taxels, cfg.receptive_field, self._body.id, overlapping
-        )
+        overlaps = own_overlaps(cfg.receptive_field)
+        self._fields: Fields = fields_of(self._taxels, cfg.receptive_field, self._body, overlaps)
         names = [bone.name for bone in load_skeleton().bones]
         self._own = rigid_bones(self._scene.geoms, self._body, len(names))
         self._ignored: Bools = np.pad(unsensed, ((0, 0), (0, len(thing))))

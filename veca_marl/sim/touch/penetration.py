@@ -27,7 +27,7 @@ A primitive with a skin of its own, such as a bone of another body, is treated a
 series: t is the sum of both thicknesses, and heights count from rigid bone to rigid bone. With s,
 the smaller of the two thicknesses, the primitive is its bone with a layer of s, which is round at
 the edges of the bone, and b lies s inside the bone, so that b remains inside of thin bones. Other
-bones of the own body are sensed in the same way, see `overlapping_triangles` for an exception.
+bones of the own body are sensed in the same way, see `own_overlaps` for exceptions.
 """
 
 from __future__ import annotations
@@ -175,7 +175,8 @@ def measure_penetration(
             solid = PressingSolid(solid_of(faces, primitive[0], primitive[1]), layer)
             column = Column(solid, thickness + skin, thickness + inset, inset, count)
             margin = farthest_contact(thickness, skin, fields.largest[bone])
-            radii = fields.radii[1 if geoms.objects[g] == fields.body else 0]
+            own_bone = geoms.objects[g] == fields.body
+            radii = fields.radii[1 + geoms.frames[g] - fields.first_frame if own_bone else 0]
             for patch in range(taxels.first_patch[bone], taxels.first_patch[bone + 1]):
                 x, y, z = to_local(primitive, workspace.patches, patch)
                 away = pressing_distance(solid, x, y, z)
@@ -234,7 +235,9 @@ def _read_patch(
         b = _row(local, triangles[t, 1])
         c = _row(local, triangles[t, 2])
         normal = _unit_normal(a, b, c)
-        if _is_outside(column, a, b, c, normal, layers[t, 0], layers[t, 1], radii[t]):
+        if radii[t] < 0.0 or _is_outside(
+            column, a, b, c, normal, layers[t, 0], layers[t, 1], radii[t]
+        ):
             continue
         for n in range(BARYCENTRIC.shape[0]):
             base = _base(a, b, c, _row(BARYCENTRIC, n), normal, depths[t, n] + column.depth)

@@ -28,6 +28,7 @@ from veca_marl.sim.geometry import (
     Floats,
     Indices,
     Mesh,
+    SceneObject,
     deform_meshes,
     distances_to,
     empty_meshes,
@@ -217,28 +218,47 @@ class Fields(NamedTuple):
     """The receptive fields of the taxels of a body.
 
     Attributes:
-        radii: ``(2, T)`` metres, of the taxels of each triangle: first for all primitives but those
-            of the own body, then for those.
+        radii: ``(1 + B, T)`` metres, of the taxels of each triangle: first for all primitives but
+            those of the own body, then for each bone of the own body. Negative where a triangle
+            does not sense that bone.
         largest: ``(B + 1,)`` metres, the largest on each bone and, last, on the body.
         body: Id of the own body among the objects of the scene.
+        first_frame: Row of the first bone of the own body among the frames of the scene.
     """
 
     radii: Floats
     largest: Floats
     body: int
+    first_frame: int
 
 
-def fields_of(taxels: TaxelTable, share: float, body: int, points: Bools | None = None) -> Fields:
+class Overlaps(NamedTuple):
+    """Triangles that read their own body where no part of it is in contact with another.
+
+    Attributes:
+        triangles: ``(T,)`` those that read any bone with their receptive fields.
+        joined: ``(B, T)`` those that read a bone even as points: the skins of both overlap.
+    """
+
+    triangles: Bools
+    joined: Bools
+
+
+def fields_of(
+    taxels: TaxelTable, share: float, body: SceneObject, overlaps: Overlaps | None = None
+) -> Fields:
     """Return receptive fields with radii of a share of the gaps between taxels.
 
     Args:
         taxels: The taxels.
         share: Of `TaxelTable.gaps`.
-        body: Id of the own body.
-        points: ``(T,)`` triangles that sense the own body without a field; None for no triangle.
+        body: The own body.
+        overlaps: Triangles that sense the own body without a field, and pairs of a bone and a
+            triangle that do not sense each other; None for none.
     """
-    radii = np.tile(share * taxels.gaps, (2, 1))
-    if points is not None:
-        radii[1, points] = 0.0
+    radii = np.tile(share * taxels.gaps, (1 + len(taxels.thickness), 1))
+    if overlaps is not None:
+        radii[1:, overlaps.triangles] = 0.0
+        radii[1:][overlaps.joined] = -1.0
     largest = np.maximum.reduceat(radii[0], taxels.first_triangle[:-1])
-    return Fields(radii, np.append(largest, radii.max()), body)
+    return Fields(radii, np.append(largest, radii.max()), body.id, body.rows.start)

@@ -1,7 +1,9 @@
 """The sense of touch: the readings of 9888 taxels on the skin of a body, or of its parts.
 
 The primitives of bones overlap inside the body, and the mesh continues inside its joints. With a
-receptive field some taxels there would sense their own body in every pose.
+receptive field some taxels there would sense their own body in every pose, and so these are points
+to it. The hands of the youngest are broad for their length: there the base of the thumb lies in the
+skin of the palm, and the taxels at that place do not sense that bone at all.
 """
 
 from __future__ import annotations
@@ -24,7 +26,13 @@ from veca_marl.sim.touch.parts import PartReadings
 from veca_marl.sim.touch.penetration import empty_workspace, read_taxels
 from veca_marl.sim.touch.quality import TouchQuality, make_transform
 from veca_marl.sim.touch.rigid_bones import rigid_bones
-from veca_marl.sim.touch.taxels import TAXELS_PER_TRIANGLE, fields_of, load_taxels, taxel_positions
+from veca_marl.sim.touch.taxels import (
+    TAXELS_PER_TRIANGLE,
+    Overlaps,
+    fields_of,
+    load_taxels,
+    taxel_positions,
+)
 
 LINE_M = 0.05
 """Length of the debug line of a taxel that reads 1; the value is ours."""
@@ -55,8 +63,8 @@ def unsensed_primitives(geoms: GeomTable, body: SceneObject) -> Bools:
     return ignored
 
 
-def overlapping_triangles(share: float, growth: Growth = REFERENCE) -> Bools:
-    """Return the mask ``(T,)`` of triangles that read their own body in the binding pose.
+def own_overlaps(share: float, growth: Growth = REFERENCE) -> Overlaps:
+    """Return what reads its own body in the binding pose.
 
     In that pose arms and legs are spread, and no part of the body is in contact with another.
 
@@ -64,28 +72,42 @@ def overlapping_triangles(share: float, growth: Growth = REFERENCE) -> Bools:
         share: Radius of the receptive fields as a share of `TaxelTable.gaps`.
         growth: Size of the body.
     """
-    return _overlapping(share, growth)
+    return _own_overlaps(share, growth)
 
 
 @functools.cache
-def _overlapping(share: float, growth: Growth) -> Bools:
-    skeleton, taxels, scene = load_skeleton(growth), load_taxels(growth), Scene()
+def _own_overlaps(share: float, growth: Growth) -> Overlaps:
+    skeleton, scene = load_skeleton(growth), Scene()
     body = scene.add_object("body", bone_geoms(skeleton, SKIN), dressed_skin(skeleton, SKIN))
     body.positions[:], body.rotations[:] = binding_pose(skeleton)
     scene.update()
-    vertices, readings = scene.meshes.vertices, np.zeros(taxels.depths.shape)
+    unsensed = unsensed_primitives(scene.geoms, body)
+    triangles = _reading_triangles(share, growth, scene, unsensed)
+    joined: Bools = np.zeros((len(skeleton.bones), len(triangles)), np.bool_)
+    # a point reads nothing where a field does not; of most bodies no point reads anything
+    if triangles.any() and _reading_triangles(0.0, growth, scene, unsensed).any():
+        for bone in range(len(joined)):
+            others: Bools = scene.geoms.frames != body.rows.start + bone
+            joined[bone] = _reading_triangles(0.0, growth, scene, unsensed | others)
+    return Overlaps(triangles, joined)
+
+
+def _reading_triangles(share: float, growth: Growth, scene: Scene, ignored: Bools) -> Bools:
+    """Return the mask ``(T,)`` of the triangles of a body, alone in a scene, that read anything."""
+    taxels, vertices, body = load_taxels(growth), scene.meshes.vertices, scene.objects[0]
+    readings = np.zeros(taxels.depths.shape)
     read_taxels(
         taxels,
-        fields_of(taxels, share, body.id),
+        fields_of(taxels, share, body),
         vertices,
         scene.geoms,
-        rigid_bones(scene.geoms, body, len(skeleton.bones)),
-        unsensed_primitives(scene.geoms, body),
+        rigid_bones(scene.geoms, body, len(taxels.thickness)),
+        ignored,
         empty_workspace(taxels, len(vertices), len(scene.geoms.shapes)),
         readings,
     )
-    overlapping: Bools = readings.max(axis=1) > 0.0
-    return overlapping
+    pressed: Bools = readings.max(axis=1) > 0.0
+    return pressed
 
 
 @dataclass
@@ -156,8 +178,8 @@ class TouchSense(Sense):
         self._transform = make_transform(cfg.quality, cfg.binary_above)
         bones, vertices = len(self._taxels.thickness), self._object.vertices
         self._ignored: Bools = np.zeros((bones, 0), np.bool_)
-        points = overlapping_triangles(cfg.receptive_field, body.growth)
-        self._fields = fields_of(self._taxels, cfg.receptive_field, body.object_id, points)
+        overlaps = own_overlaps(cfg.receptive_field, body.growth)
+        self._fields = fields_of(self._taxels, cfg.receptive_field, self._object, overlaps)
         self._own = rigid_bones(self._scene.geoms, self._object, bones)
         self._workspace = empty_workspace(self._taxels, vertices.stop - vertices.start, 0)
         self._readings = np.zeros((len(self._taxels.triangles), TAXELS_PER_TRIANGLE))
