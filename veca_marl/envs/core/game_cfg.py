@@ -132,10 +132,14 @@ class GameCfg:
         """Check that the task and all its players fit into the playground.
 
         Raises:
-            ValueError: If the task cannot be played there, or the floor is too small.
+            ValueError: If the task cannot be played there, the floor is too small, or a distance of
+                the task does not fit the size of a body.
         """
-        find_task(self.task.name).check_playground(self.task, self.playground)
+        task = find_task(self.task.name)
+        task.check_playground(self.task, self.playground)
         self._check_floor()
+        bodies = {team.name: self.body_of(team.name) for team in self.teams}
+        task.check_distances(self.task, self.playground, bodies)
 
     def check_clock(self) -> None:
         """Check that the numbers of the task fit the time steps.

@@ -376,6 +376,18 @@ class Task(ABC):
         """
 
     @classmethod  # noqa: B027  optional
+    def check_distances(
+        cls, cfg: Any, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
+    ) -> None:
+        """Check that the distances of the task fit the size of the bodies, by team name.
+
+        Called after `check_playground`, before a world is built.
+
+        Raises:
+            ValueError: If not; the message names the value that is impossible and the choices.
+        """
+
+    @classmethod  # noqa: B027  optional
     def check_clock(cls, cfg: Any, clock: ClockCfg) -> None:
         """Check that the numbers of the task fit the time steps, before a world is built.
 

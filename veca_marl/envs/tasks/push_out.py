@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
+from veca_marl.envs.tasks.floors.outlines import (
+    farthest_back_m,
+    outlines_overlap,
+    placed,
+    start_outline,
+)
 from veca_marl.envs.tasks.floors.places import (
     clearances_m,
     direct_gaze_ahead,
     is_furniture,
     place_player,
 )
-from veca_marl.sim.body import Body
+from veca_marl.sim.body import Body, BodyCfg
 from veca_marl.sim.geometry import Floats, horizontal_distance
 from veca_marl.sim.physics import (
     PlannedProp,
@@ -34,7 +40,89 @@ Colour = tuple[float, float, float]
 _RIM_M = 0.06
 _CLAY, _ROPE = (0.80, 0.62, 0.36), (0.97, 0.97, 0.92)
 _TEAM_SPACING_RAD = math.radians(60.0)  # between players of a team at the start
-_MOST_DRAWS = 200
+_MOST_DRAWS, _RESTARTS = 200, 20
+_TRIALS, _TRIAL_DRAWS = 20, 100
+
+
+class _Start(NamedTuple):
+    """Where a player starts in a ring with its middle at the origin.
+
+    Attributes:
+        outline: The outline of its body, see `start_outline`.
+        angle_rad: Direction of the place from the middle.
+        distance_m: Distance from the middle.
+    """
+
+    outline: Floats
+    angle_rad: float
+    distance_m: float
+
+    def turned(self, deviation_rad: float) -> Floats:
+        """Return its placed outline, by an angle off the direction of the middle."""
+        place = _polar_point(self.angle_rad, self.distance_m)
+        return placed(self.outline, place, self.angle_rad + math.pi + deviation_rad)
+
+
+def check_starts(cfg: PushOutCfg, teams: Sequence[Team], bodies: Mapping[str, BodyCfg]) -> None:
+    """Check that players of a size find headings at the start at which they do not overlap.
+
+    Raises:
+        ValueError: If a trial finds none.
+    """
+    distance_m, spread_rad = cfg.start_share * cfg.radius_m, math.radians(cfg.spread_deg)
+    starts = [
+        _Start(start_outline(bodies[team.name]), angle_rad, distance_m)
+        for number, team in enumerate(teams)
+        for angle_rad in _angles_rad(team.size, number * math.pi)
+    ]
+    rng = np.random.default_rng(0)
+    if all(_find_headings(starts, spread_rad, rng) for _ in range(_TRIALS)):
+        return
+    heights_m = sorted({f"{bodies[team.name].growth.height_m:.3g}" for team in teams})
+    raise ValueError(
+        f"task.start_share={cfg.start_share} of task.radius_m={cfg.radius_m}: players "
+        f"{' and '.join(heights_m)} m high overlap at their start {distance_m:.2f} m from the "
+        "middle; choose a greater one, or smaller bodies (body.age_months)"
+    )
+
+
+def _find_headings(starts: Sequence[_Start], spread_rad: float, rng: np.random.Generator) -> bool:
+    """Return whether one of some draws of all headings lets no two players overlap."""
+    for _ in range(_TRIAL_DRAWS):
+        outlines = [start.turned(rng.uniform(-spread_rad, spread_rad)) for start in starts]
+        if not any(outlines_overlap(*pair) for pair in combinations(outlines, 2)):
+            return True
+    return False
+
+
+def check_room_behind(
+    cfg: PushOutCfg, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
+) -> None:
+    """Check that players do not start in the walls or furniture round the ring.
+
+    Raises:
+        ValueError: If the farthest part of a body can be there.
+    """
+    room, spread_rad = playground.rooms[0], math.radians(cfg.spread_deg)
+    behind_m = max(farthest_back_m(start_outline(body), spread_rad) for body in bodies.values())
+    farthest_m = cfg.start_share * cfg.radius_m + behind_m
+    away_m, nearest = _nearest_furniture(room, playground)
+    wall_m = min(room.size_m[:2]) / 2.0
+    if farthest_m < min(away_m, wall_m):
+        return
+    obstacle, at_m = (
+        (f"the walls of {room.name!r}", wall_m)
+        if wall_m <= away_m
+        else (
+            repr(nearest),
+            away_m,
+        )
+    )
+    raise ValueError(
+        f"playground {playground.name!r}: task.start_share={cfg.start_share} of "
+        f"task.radius_m={cfg.radius_m}: players reach {farthest_m:.2f} m from the middle of the "
+        f"ring at their start, and {obstacle} are {at_m:.2f} m away; choose a smaller one"
+    )
 
 
 def check_ring(radius_m: float, playground: PlaygroundCfg) -> None:
@@ -104,10 +192,11 @@ class Ring:
         start_share: float,
         spread_deg: float,
         rng: np.random.Generator,
-    ) -> None:
+    ) -> bool:
         """Place a team side by side on one side of the ring, facing the middle.
 
-        The headings are drawn again while its players penetrate each other, or others.
+        The headings are drawn again while its players penetrate each other, or others, at most
+        `_MOST_DRAWS` times.
 
         Args:
             players: The players of the team.
@@ -117,22 +206,18 @@ class Ring:
             spread_deg: Largest deviation of the heading from the direction of the middle.
             rng: Random generator of the episode.
 
-        Raises:
-            ValueError: If they still do after `_MOST_DRAWS`.
+        Returns:
+            Whether they do not any more.
         """
-        middle_rank = (len(players) - 1) / 2.0
-        angles_rad = [side_rad + _TEAM_SPACING_RAD * (n - middle_rank) for n in range(len(players))]
+        angles_rad = _angles_rad(len(players), side_rad)
         for _ in range(_MOST_DRAWS):
             for player, angle_rad in zip(players, angles_rad, strict=True):
                 place = self.middle + _polar_point(angle_rad, start_share * self.radius_m)
                 deviation_rad = math.radians(rng.uniform(-spread_deg, spread_deg))
                 place_player(player, place, angle_rad + math.pi + deviation_rad)
             if not self._overlap(players, others):
-                return
-        raise ValueError(
-            f"task.start_share={start_share} of task.radius_m={self.radius_m}: players overlap in "
-            f"each of {_MOST_DRAWS} starts; choose a greater one"
-        )
+                return True
+        return False
 
     def _overlap(self, players: Sequence[Player], others: Sequence[Player]) -> bool:
         """Return whether two of some players, or one of them and one of others, penetrate."""
@@ -141,6 +226,12 @@ class Ring:
             penetration_m(self._world.client, one.body.body_id, other.body.body_id) > 0.0
             for one, other in pairs
         )
+
+
+def _angles_rad(players: int, side_rad: float) -> list[float]:
+    """Return the directions from the middle of the players of a team, side by side."""
+    middle_rank = (players - 1) / 2.0
+    return [side_rad + _TEAM_SPACING_RAD * (rank - middle_rank) for rank in range(players)]
 
 
 def _polar_point(direction_rad: float, distance_m: float = 1.0) -> Floats:
@@ -223,6 +314,13 @@ class PushOut(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_ring(cfg.radius_m, playground)
 
+    @classmethod
+    def check_distances(
+        cls, cfg: Any, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
+    ) -> None:
+        check_starts(cfg, cls.teams_of(cfg), bodies)
+        check_room_behind(cfg, playground, bodies)
+
     def build(self) -> None:
         self.ring = Ring(self.world, self.cfg.radius_m)
         self._team_names = list(dict.fromkeys(player.team for player in self.players))
@@ -232,17 +330,28 @@ class PushOut(Task):
         self._gained: dict[str, float] = {}
 
     def reset(self, rng: np.random.Generator) -> None:
-        side_rad, cfg = rng.uniform(-math.pi, math.pi), self.cfg
-        placed: list[Player] = []
-        for number, name in enumerate(self._team_names):
-            team, team_side_rad = self._team(name), side_rad + number * math.pi
-            self.ring.place_team(team, placed, team_side_rad, cfg.start_share, cfg.spread_deg, rng)
-            placed += team
+        side_rad = rng.uniform(-math.pi, math.pi)
+        # the headings of one team may leave none to the other: then both are drawn again
+        if not any(self._place_teams(side_rad, rng) for _ in range(_RESTARTS)):
+            raise ValueError(
+                f"task.start_share={self.cfg.start_share} of task.radius_m={self.cfg.radius_m}: "
+                f"players overlap in each of {_RESTARTS} starts; choose a greater one"
+            )
         direct_gaze_ahead(self.players)
         self._playing = {player.name for player in self.players}
         self._newly_out = set()
         self._area = self._areas()
         self._gained = dict.fromkeys(self._area, 0.0)
+
+    def _place_teams(self, side_rad: float, rng: np.random.Generator) -> bool:
+        """Place all teams, the first one on a side; return whether nobody overlaps."""
+        share, spread_deg, before = self.cfg.start_share, self.cfg.spread_deg, list[Player]()
+        for number, name in enumerate(self._team_names):
+            team, team_side_rad = self._team(name), side_rad + number * math.pi
+            if not self.ring.place_team(team, before, team_side_rad, share, spread_deg, rng):
+                return False
+            before += team
+        return True
 
     def after_step(self, rng: np.random.Generator) -> None:
         direct_gaze_ahead(self.players)

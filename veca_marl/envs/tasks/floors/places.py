@@ -110,13 +110,22 @@ def is_furniture(prop: PropCfg) -> bool:
 
 def add_target(world: World, radius_m: float) -> Prop:
     """Add the object that is searched for, a fixed red ball."""
-    return world.add_prop(
-        PropCfg(
-            name="target",
-            shape=PropShape.sphere,
-            size_m=[radius_m],
-            colour=(0.95, 0.15, 0.1),
-        )
+    return world.add_prop(_target(radius_m))
+
+
+def planned_target(radius_m: float) -> PlannedProp:
+    """Return what `add_target` adds, standing at the origin of the floor plan."""
+    thing = PlannedProp(_target(radius_m))
+    thing.place((0.0, 0.0, radius_m))
+    return thing
+
+
+def _target(radius_m: float) -> PropCfg:
+    return PropCfg(
+        name="target",
+        shape=PropShape.sphere,
+        size_m=[radius_m],
+        colour=(0.95, 0.15, 0.1),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_walker, terms
-from veca_marl.envs.tasks.floors.places import add_target, gap_m
+from veca_marl.envs.tasks.floors.outlines import check_reach
+from veca_marl.envs.tasks.floors.places import add_target, gap_m, planned_target
 from veca_marl.envs.tasks.navigation.mazes import (
     Cell,
     Maze,
@@ -20,7 +22,7 @@ from veca_marl.envs.tasks.navigation.mazes import (
     passage_m,
     random_maze,
 )
-from veca_marl.sim.body import Body
+from veca_marl.sim.body import Body, BodyCfg
 from veca_marl.sim.body.walker import WalkerCfg
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, World
 from veca_marl.sim.sense import ArraySpec, Sense
@@ -133,6 +135,12 @@ class MazeNav(Task):
     def check_playground(cls, cfg: Any, playground: PlaygroundCfg) -> None:
         check_maze(playground, cfg.cells)
         _check_reach(cfg, playground, WalkerCfg().radius_m)
+
+    @classmethod
+    def check_distances(
+        cls, cfg: Any, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
+    ) -> None:
+        check_reach(cfg.reach_m, planned_target(_RADIUS_M), bodies)
 
     @classmethod
     def check_clock(cls, cfg: Any, clock: ClockCfg) -> None:

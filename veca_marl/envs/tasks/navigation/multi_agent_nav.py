@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -13,6 +13,7 @@ import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
 from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
+from veca_marl.envs.tasks.floors.outlines import check_reach
 from veca_marl.envs.tasks.floors.places import (
     add_target,
     direct_gaze_ahead,
@@ -22,6 +23,7 @@ from veca_marl.envs.tasks.floors.places import (
     gap_m,
     place_player,
     planned_furniture,
+    planned_target,
     rooms_with_pairs,
 )
 from veca_marl.envs.tasks.floors.playability import (
@@ -35,6 +37,7 @@ from veca_marl.envs.tasks.navigation.helper_reward import (
     TURN_WEIGHT,
     HelperReward,
 )
+from veca_marl.sim.body import BodyCfg
 from veca_marl.sim.physics import PlaygroundCfg, RoomCfg, StandingProp
 
 _PASSAGE_M = 0.2  # width that an agent at the object leaves free towards the walls
@@ -142,6 +145,12 @@ class MultiAgentNav(Task):
             f"task.reach_m={cfg.reach_m:g}",
             "smaller ones, or larger rooms, such as playground=seven_rooms",
         )
+
+    @classmethod
+    def check_distances(
+        cls, cfg: Any, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
+    ) -> None:
+        check_reach(cfg.reach_m, planned_target(cfg.radius_m), bodies)
 
     def build(self) -> None:
         check_doorways(self.world.playground, self.players)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple
@@ -10,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, register_task, require_humanoid, terms
+from veca_marl.envs.tasks.floors.outlines import check_reach
 from veca_marl.envs.tasks.floors.places import (
     Spacing,
     direct_gaze_ahead,
@@ -22,6 +24,7 @@ from veca_marl.envs.tasks.floors.places import (
 )
 from veca_marl.envs.tasks.floors.playability import check_connected, check_placement
 from veca_marl.envs.tasks.navigation.helper_reward import AHEAD_WEIGHT, TURN_WEIGHT, HelperReward
+from veca_marl.sim.body import BodyCfg
 from veca_marl.sim.body.humanoid import HumanoidCfg
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.physics import PlannedProp, PlaygroundCfg, Prop, PropCfg, PropShape, World
@@ -191,6 +194,14 @@ class ObjectNav(Task):
             f"and task.reach_m={cfg.reach_m:g}",
             "fewer or smaller ones, or a larger playground, such as playground=house",
         )
+
+    @classmethod
+    def check_distances(
+        cls, cfg: Any, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
+    ) -> None:
+        target = PlannedProp(_prop_of("target", cfg.target))
+        target.place((0.0, 0.0, _LOOKS[cfg.target].centre_m))
+        check_reach(cfg.reach_m, target, bodies)
 
     def build(self) -> None:
         self.agent = self.players[0]
