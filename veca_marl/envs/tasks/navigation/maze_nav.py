@@ -24,6 +24,7 @@ from veca_marl.envs.tasks.navigation.mazes import (
 )
 from veca_marl.sim.body import Body, BodyCfg
 from veca_marl.sim.body.walker import WalkerCfg
+from veca_marl.sim.body.walker.walker_cfg import sized
 from veca_marl.sim.physics import ClockCfg, PlaygroundCfg, World
 from veca_marl.sim.sense import ArraySpec, Sense
 from veca_marl.sim.senses import register_sense
@@ -140,6 +141,9 @@ class MazeNav(Task):
     def check_distances(
         cls, cfg: Any, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
     ) -> None:
+        for body in bodies.values():
+            if isinstance(body, WalkerCfg):
+                _check_passage(cfg, playground, sized(body).radius_m)
         check_reach(cfg.reach_m, planned_target(_RADIUS_M), bodies)
 
     @classmethod
