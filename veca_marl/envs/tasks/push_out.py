@@ -110,14 +110,9 @@ def check_room_behind(
     wall_m = min(room.size_m[:2]) / 2.0
     if farthest_m < min(away_m, wall_m):
         return
-    obstacle, at_m = (
-        (f"the walls of {room.name!r}", wall_m)
-        if wall_m <= away_m
-        else (
-            repr(nearest),
-            away_m,
-        )
-    )
+    obstacle, at_m = repr(nearest), away_m
+    if wall_m <= away_m:
+        obstacle, at_m = f"the walls of {room.name!r}", wall_m
     raise ValueError(
         f"playground {playground.name!r}: task.start_share={cfg.start_share} of "
         f"task.radius_m={cfg.radius_m}: players reach {farthest_m:.2f} m from the middle of the "
