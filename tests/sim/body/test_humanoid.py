@@ -17,7 +17,14 @@ from veca_marl.sim.body.humanoid import (
     HumanoidCfg,
     JointActionKind,
 )
-from veca_marl.sim.body.humanoid.postures import ON_BACK, POSTURES, Posture, posture_angles
+from veca_marl.sim.body.humanoid.postures import (
+    ON_BACK,
+    ON_BELLY,
+    POSTURES,
+    Posture,
+    posture_angles,
+)
+from veca_marl.sim.body.sense_organs import EYES
 
 SKELETON = load_skeleton()
 ALL = [bone.name for bone in SKELETON.bones]
@@ -37,6 +44,28 @@ def test_both_details_have_47_bones_and_82_joints(make_child, detail):
     assert len(body.articulation.moving) == {Detail.full: 82, Detail.mitten: 40}[detail]
     for mount in MOUNTS:
         assert np.isfinite(body.mount(mount).position).all()
+
+
+@pytest.mark.parametrize("head_turn_deg", [0.0, 25.0, -25.0])
+@pytest.mark.parametrize("depth_m", [0.0, 0.03, 0.06])
+def test_eyes_stay_above_the_floor_and_apart(make_child, depth_m, head_turn_deg):
+    _, body = make_child()
+    neck = {"neck.flexion": 20.0, "neck.rotation": head_turn_deg}
+    face_down = Posture(90.0, {**ON_BELLY.joints_deg, **neck})
+    body.place((0.0, 0.0, 1.0), posture=face_down)
+    above = [body.mount(eye) for eye in EYES]
+    body.place((0.0, 0.0, -depth_m), posture=face_down)
+    eyes = [body.mount(eye) for eye in EYES]
+    assert min(eye.position[2] for eye in eyes) > 0.0049
+    np.testing.assert_allclose(
+        eyes[0].position - eyes[1].position, above[0].position - above[1].position, atol=1e-9
+    )
+    lowest = min(eye.position[2] for eye in above) - 1.0 - depth_m
+    raised = max(0.005 - lowest, 0.0)
+    assert (raised > 0.0) == (depth_m > 0.0)
+    for one, other in zip(eyes, above, strict=True):
+        assert one.position[2] == pytest.approx(other.position[2] - 1.0 - depth_m + raised)
+        np.testing.assert_allclose(one.rotation, other.rotation, atol=1e-9)
 
 
 def test_it_is_made_by_its_configuration():

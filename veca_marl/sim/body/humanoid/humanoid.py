@@ -39,10 +39,13 @@ from veca_marl.sim.body.humanoid.postures import (
     perturbed,
     posture_angles,
 )
+from veca_marl.sim.body.sense_organs import MOUNTS_M
 from veca_marl.sim.geometry import Floats, Pose, heading_rad
 from veca_marl.sim.physics import World, is_contact
 from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.sense import ArraySpec, continuous_spec
+
+_EYE_HEIGHT_M = 0.005  # least height of an eye above the floor
 
 
 class Detail(Enum):
@@ -259,6 +262,20 @@ class Humanoid(Body):
         positions[:, 2] += place[2] - self._underside.lowest_m(positions, rotations)
         self.articulation.place(Pose(positions[0].copy(), rotations[0].copy()), angles)
         self._start()
+
+    def _kept_eye(self, name: str, eye: Pose) -> Pose:
+        """Return the pose of an eye, raised if one of both is below the floor or too near to it.
+
+        Eyes are up to 12 mm in front of what the head collides with, and contacts give way. Both
+        are raised alike, so that their distance from each other stays what it is.
+        """
+        height_m = float(eye.position[2])
+        to_other_m = -2.0 * MOUNTS_M[name][1] * self._head_size
+        other_m = height_m + to_other_m * float(eye.rotation[2, 1])
+        missing_m = _EYE_HEIGHT_M - min(height_m, other_m)
+        if missing_m <= 0.0:
+            return eye
+        return Pose(eye.position + np.array([0.0, 0.0, missing_m]), eye.rotation)
 
     def _checked(self, posture: Posture | Floats) -> Floats:
         if isinstance(posture, Posture):
