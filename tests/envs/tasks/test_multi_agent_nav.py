@@ -109,7 +109,7 @@ def test_a_separate_finder_has_the_same_share_in_the_reward():
     ("overrides", "parts"),
     [
         (
-            ["body.radius_m=0.6", "body.capsule_height_m=1.5"],
+            ["body.radius_m=0.6", "body.capsule_height_m=1.5", "task.reach_m=0.8"],
             ("door", "width_m=1", "seekers_0", "body.radius_m=0.6"),
         ),
         (
