@@ -5,7 +5,7 @@
 #     docker run -p 5555:5555 -v "$PWD/veca_keys:/keys" veca +task=TurnBaby worlds=4 keys=/keys \
 #         address=tcp://0.0.0.0:5555
 FROM python:3.11-slim
-COPY pyproject.toml README.md LICENSE /veca/
+COPY pyproject.toml hatch_build.py README.md LICENSE /veca/
 COPY veca_marl /veca/veca_marl
 COPY hydra_plugins /veca/hydra_plugins
 COPY conf /veca/conf
