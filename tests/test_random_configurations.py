@@ -7,6 +7,8 @@ import pytest
 from random_configurations import draw, draw_changes, refusal, refusal_of_changes
 
 from veca_marl.config import compose_node
+from veca_marl.envs.tasks.floors.outlines import start_outline
+from veca_marl.sim.body.walker import WalkerCfg
 
 LONGEST_S = 120
 
@@ -53,6 +55,28 @@ def test_some_random_changes_of_a_composed_configuration(time_limit):
         except Exception as error:
             error.add_note(f"change {number}: {' '.join(changes)}")
             raise
+
+
+FOUND = [
+    (["+task=TurnBaby"], ["playground.walls={a:1}"]),
+    (["+task=KickTheBall"], ["senses.audio.sofa_path=1e308"]),
+    (["+task=GrabObject"], ["task.turn_deg=1e308"]),
+    (["+task=MoveToTarget"], ["task.aside_m=-0.0"]),
+]
+"""What soaks have found, each refused in one line now."""
+
+
+@pytest.mark.parametrize(("presets", "changes"), FOUND, ids=lambda words: words[0])
+def test_what_soaks_have_found_is_refused(presets, changes, time_limit):
+    node = compose_node(presets)
+    for change in changes:
+        time_limit()
+        assert refusal_of_changes(node, [change], 0) is not None
+        assert refusal([*presets, change], 0) is not None
+
+
+def test_a_very_high_capsule_needs_little_memory():
+    assert len(start_outline(WalkerCfg(capsule_height_m=1e9))) < 10_000
 
 
 @pytest.mark.slow

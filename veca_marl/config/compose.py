@@ -198,11 +198,27 @@ def _check_readable(overrides: Sequence[str]) -> None:
 
 def _check_parts(group: str, overrides: Sequence[str]) -> None:
     """Refuse overrides of parts of a group that is null: Hydra fails in them with an assertion."""
-    parts = [text for text in overrides if re.match(rf"[+]*{group}([.]|=[{{])", text)]
-    if not parts:
-        return
-    others = _composed([text for text in overrides if text not in parts])
-    if OmegaConf.select(others, group) is None:
+    if parts := _parts_of(group, overrides):
+        others = _composed([text for text in overrides if text not in parts])
+        _refuse_parts(others, group, parts)
+
+
+def check_parts(node: DictConfig, overrides: Sequence[str]) -> None:
+    """Refuse overrides of parts of what is null in a node, as `prepare` does before composition.
+
+    Raises:
+        ConfigError: If there is one.
+    """
+    for group in _MAY_BE_NULL:
+        _refuse_parts(node, group, _parts_of(group, overrides))
+
+
+def _parts_of(group: str, overrides: Sequence[str]) -> list[str]:
+    return [text for text in overrides if re.match(rf"[+]*{group}([.]|=[{{])", text)]
+
+
+def _refuse_parts(node: DictConfig, group: str, parts: Sequence[str]) -> None:
+    if parts and OmegaConf.select(node, group) is None:
         raise ConfigError(
             f"{parts[0]}: {group} is null here, so that no part of it can be set; choose another "
             f"preset, such as {group.partition('.')[0]}=house, or write one with {group}"

@@ -12,7 +12,7 @@ from omegaconf.errors import OmegaConfBaseException
 from veca_marl.algos.algorithm import ALGORITHMS
 from veca_marl.algos.intrinsic.intrinsic_reward import INTRINSICS, NONE, IntrinsicCfg
 from veca_marl.algos.networks.factory import NETWORKS
-from veca_marl.config.compose import compose_node, load_config_plugins
+from veca_marl.config.compose import check_parts, compose_node, load_config_plugins
 from veca_marl.config.errors import ConfigError, one_line
 from veca_marl.config.overrides import check_group_values, conf_dirs, parse
 from veca_marl.config.root import body_types, root_schema
@@ -181,6 +181,7 @@ def change(node: DictConfig, overrides: Sequence[str], allowed: Sequence[str] = 
             node.team[path[1]] = OmegaConf.structured(TeamCfg)
         try:
             check_group_values([str(override.input_line)])
+            check_parts(node, [str(override.input_line)])
             _apply(node, override)
         except OmegaConfBaseException as error:
             raise ConfigError(one_line(error)) from error

@@ -168,6 +168,9 @@ RATE_STEP_S = 0.04
 GREATEST_WEIGHT = 1e30
 """Rewards are float32, which ends at 3e38."""
 
+GREATEST_NUMBER = 1e9
+"""Of any distance, angle, time or mass of a task; sums and differences of larger ones overflow."""
+
 LONGEST_EPISODE_S = 1e9
 """Thirty years; the steps of an episode are counted."""
 
@@ -211,18 +214,22 @@ class TaskCfg:
             raise ValueError(f"task.weights: {bad} must be numbers of at most {GREATEST_WEIGHT:g}")
 
     def check_positive(self, *names: str) -> None:
-        """Raise `ValueError` if a field is zero, negative or not finite."""
+        """Raise `ValueError` if a field is zero, negative or above `GREATEST_NUMBER`."""
         for name in names:
             value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ValueError(f"task.{name}={value} must be a positive number")
+            if not 0.0 < value <= GREATEST_NUMBER:
+                raise ValueError(
+                    f"task.{name}={value} must be a positive number of at most {GREATEST_NUMBER:g}"
+                )
 
     def check_not_negative(self, *names: str) -> None:
-        """Raise `ValueError` if a field is negative or not finite."""
+        """Raise `ValueError` if a field is negative, also as -0.0, or above `GREATEST_NUMBER`."""
         for name in names:
             value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise ValueError(f"task.{name}={value} must be 0 or more")
+            if not 0.0 <= value <= GREATEST_NUMBER or math.copysign(1.0, value) < 0.0:
+                raise ValueError(
+                    f"task.{name}={value} must be 0 or more, and at most {GREATEST_NUMBER:g}"
+                )
 
     def _check_span(self, name: str, lowest: float, condition: str) -> None:
         """Raise `ValueError` if a field is no pair (least, greatest) of at least `lowest`."""

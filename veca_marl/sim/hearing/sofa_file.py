@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -136,7 +137,7 @@ def open_sofa(path: str | Path) -> Iterator[SofaFile]:
     except ImportError:
         raise ImportError("SOFA files need h5py: pip install 'veca_marl[sofa]'") from None
     name = Path(path).name
-    if not Path(path).is_file():
+    if not os.path.isfile(path):  # False also for a name that is too long
         raise SofaError(f"{path}: no such file")
     try:
         with h5py.File(path, "r") as file:

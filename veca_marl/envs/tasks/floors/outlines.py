@@ -25,6 +25,7 @@ from veca_marl.sim.geometry import Floats, Primitive, Shape, distances_to
 from veca_marl.sim.physics import PlannedProp
 
 _STEP = 0.4  # distance of the spheres of a capsule, in radii: their hollows are 2 % of these
+_MOST_SPHERES = 1000  # of a capsule
 _TOUCHING_M = 1e-4
 _ADVANCES = 200
 _SIDES = 8  # of a body, with which it can touch a thing
@@ -78,8 +79,9 @@ def _spheres(part: Primitive) -> Floats:
 
 @functools.cache
 def _upright(radius_m: float, height_m: float) -> Floats:
-    heights = np.arange(radius_m, max(height_m - radius_m, radius_m) + 1e-9, _STEP * radius_m)
-    zero = np.zeros(len(heights))
+    highest_m = max(height_m - radius_m, radius_m)
+    count = 2 + min(int((highest_m - radius_m) / (_STEP * radius_m)), _MOST_SPHERES)
+    heights, zero = np.linspace(radius_m, highest_m, count), np.zeros(count)
     return np.column_stack([zero, zero, heights, np.full(len(heights), radius_m)])
 
 
