@@ -239,7 +239,8 @@ def _try(found: Configurations, words: list[str], refusal: Callable[[], str | No
     try:
         found.refused += refusal() is not None
     except Exception as error:  # whatever it is, it is reported with its configuration
-        found.failed.append(f"{' '.join(words)}: {type(error).__name__}: {str(error)[:300]}")
+        reason = " ".join(str(error).split())[:300]
+        found.failed.append(f"{' '.join(words)}: {type(error).__name__}: {reason}")
     finally:
         signal.alarm(0)
     found.tried += 1

@@ -1,4 +1,4 @@
-"""Whoever has worlds on a server gives them back at its end, so that the next client has a place.
+"""A client gives its worlds on a server back when it ends, so that the next one has a place.
 
 Lost connections are kept for ten minutes here: worlds that end, end because of what their client
 has said.
@@ -42,10 +42,11 @@ def server(cfg):
 
 @pytest.fixture(autouse=True)
 def places_are_free_afterwards(server):
+    """Check after every test that no worlds are left, which is what most of them are for."""
     yield
     end = time.monotonic() + 30.0
     while server._sessions:
-        assert time.monotonic() < end, "worlds are left whose client has ended"
+        assert time.monotonic() < end, "worlds of a client that has ended are left"
         time.sleep(0.05)
 
 
@@ -107,14 +108,14 @@ def test_a_process_that_is_ended_while_it_plays_ends_its_worlds(server):
     assert playing.wait(60.0)
     process.terminate()
     process.join(30.0)
-    assert process.exitcode == -signal.SIGTERM, "whoever waits for it does not see what ended it"
+    assert process.exitcode == -signal.SIGTERM, "its parent does not see that the signal ended it"
 
 
 def fail_in_play(address):
     prepare_child(os.getppid())
     env = ServedGames(address)(2, 0)
     env.reset()
-    raise RuntimeError(f"{env.batch_size} worlds, and no plan")
+    raise RuntimeError(f"{env.batch_size} worlds, and an error")
 
 
 def test_a_process_that_fails_ends_its_worlds(server):

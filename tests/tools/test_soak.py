@@ -2,6 +2,7 @@
 
 import pytest
 
+import veca_marl
 from tools.soak_page import FLAT, Configurations, Parsers, Sample, Soak, page
 
 
@@ -12,6 +13,13 @@ def soak(*memory_mb, step=3.0, files=20, problems=()):
 
 def test_the_first_round_fills_caches():
     assert not soak(100.0, 500.0, 500.0, 500.0, 510.0).faults
+
+
+def test_the_first_training_of_every_task_is_no_growth():
+    tasks = len(veca_marl.list_tasks())
+    assert not soak(*[100.0] * (tasks - 1), *[500.0] * 4).faults
+    (fault,) = soak(*[100.0] * (tasks + 2), *[500.0] * 4).faults
+    assert "memory" in fault
 
 
 @pytest.mark.parametrize("last", [600.0, 1000.0])

@@ -110,21 +110,21 @@ _LAST_CALLS: WeakSet[Finalize[None]] = WeakSet()
 def call_at_the_end(owner: object, call: Callable[[], None]) -> Finalize[None]:
     """Call a function once: when an object is dropped, or at the end of this process.
 
-    In a process that `multiprocessing` has started the end is also SIGTERM, by which such processes
-    are ended whose work is done, unless the program handles this signal itself. There is no such
-    call in a process that is killed (SIGKILL).
+    In a process that `multiprocessing` has started, SIGTERM is such an end too, unless the program
+    handles this signal itself: pools end their idle processes by it. In a process that is killed
+    (SIGKILL) the function is not called.
 
     Args:
         owner: The object. `call` must not refer to it, or it is not dropped.
-        call: The function; it may be called in the middle of anything that the main thread does.
+        call: The function; a signal may call it between any two instructions of the main thread.
 
     Returns:
-        What calls the function at once, and so for the last time. In a process that was forked
-        from this one it does nothing.
+        An object that calls the function at once when it is called; there is no later call then.
+        In a process that was forked from this one it does nothing.
     """
     last = Finalize(owner, call, exitpriority=0)
     _LAST_CALLS.add(last)
-    # not in the first process of a program, whose signals are its own
+    # only in child processes: signals of the main process belong to the program
     if parent_process() is not None and _sigterm_is_free():
         signal.signal(signal.SIGTERM, _end_after_last_calls)
     return last
@@ -137,7 +137,7 @@ def _sigterm_is_free() -> bool:
 
 
 def _end_after_last_calls(number: int, frame: Any) -> None:
-    """Make all last calls, then end by the signal: whoever waits for this process sees it."""
+    """Make all last calls, then end by the signal, which is the exit code that the parent sees."""
     signal.signal(number, signal.SIG_IGN)  # a second one would cut them off
     with ExitStack() as stack:
         stack.callback(os.kill, os.getpid(), number)

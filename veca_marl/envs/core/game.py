@@ -319,7 +319,7 @@ class Game:
 
     @property
     def broken(self) -> list[str]:
-        """Names of the bodies and props whose state is no longer finite.
+        """Names of the bodies and props with a state that is no longer finite.
 
         Bullet does not recover from that: `reset` and `Restoring` call `rebuild`.
         """

@@ -121,7 +121,7 @@ class Snapshots:
 class Restoring:
     """A snapshot that was checked against the game that it is to be restored in.
 
-    A game whose state is no longer finite is first built again, see `Game.rebuild`.
+    A game with a state that is no longer finite is first built again, see `Game.rebuild`.
 
     Args:
         game: The game.

@@ -5,258 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from veca_marl.envs.core.task import Player, Task, TaskCfg, Team, register_task, terms
-from veca_marl.envs.tasks.floors.outlines import (
-    farthest_back_m,
-    outlines_overlap,
-    placed,
-    start_outline,
-)
-from veca_marl.envs.tasks.floors.places import (
-    clearances_m,
-    direct_gaze_ahead,
-    is_furniture,
-    place_player,
+from veca_marl.envs.tasks.floors.places import direct_gaze_ahead
+from veca_marl.envs.tasks.floors.ring import (
+    Ring,
+    RingStart,
+    check_ring,
+    check_room_behind,
+    check_starts,
 )
 from veca_marl.sim.body import Body, BodyCfg
-from veca_marl.sim.geometry import Floats, horizontal_distance
-from veca_marl.sim.physics import (
-    PlannedProp,
-    PlaygroundCfg,
-    PropCfg,
-    PropShape,
-    RoomCfg,
-    World,
-    penetration_m,
-)
+from veca_marl.sim.geometry import horizontal_distance
+from veca_marl.sim.physics import PlaygroundCfg
 
-Colour = tuple[float, float, float]
-
-_RIM_M = 0.06
-_CLAY, _ROPE = (0.80, 0.62, 0.36), (0.97, 0.97, 0.92)
-_TEAM_SPACING_RAD = math.radians(60.0)  # between players of a team at the start
-_MOST_DRAWS, _RESTARTS = 200, 20
-_TRIALS, _TRIAL_DRAWS = 20, 100
-
-
-class _Start(NamedTuple):
-    """Where a player starts in a ring with its middle at the origin.
-
-    Attributes:
-        outline: The outline of its body, see `start_outline`.
-        angle_rad: Direction of the place from the middle.
-        distance_m: Distance from the middle.
-    """
-
-    outline: Floats
-    angle_rad: float
-    distance_m: float
-
-    def turned(self, deviation_rad: float) -> Floats:
-        """Return its placed outline, by an angle off the direction of the middle."""
-        place = _polar_point(self.angle_rad, self.distance_m)
-        return placed(self.outline, place, self.angle_rad + math.pi + deviation_rad)
-
-
-def check_starts(cfg: PushOutCfg, teams: Sequence[Team], bodies: Mapping[str, BodyCfg]) -> None:
-    """Check that players of a size find headings at the start at which they do not overlap.
-
-    Raises:
-        ValueError: If a trial finds none.
-    """
-    distance_m, spread_rad = cfg.start_share * cfg.radius_m, math.radians(cfg.spread_deg)
-    starts = [
-        _Start(start_outline(bodies[team.name]), angle_rad, distance_m)
-        for number, team in enumerate(teams)
-        for angle_rad in _angles_rad(team.size, number * math.pi)
-    ]
-    rng = np.random.default_rng(0)
-    if all(_find_headings(starts, spread_rad, rng) for _ in range(_TRIALS)):
-        return
-    heights_m = sorted({f"{bodies[team.name].growth.height_m:.3g}" for team in teams})
-    raise ValueError(
-        f"task.start_share={cfg.start_share} of task.radius_m={cfg.radius_m}: players "
-        f"{' and '.join(heights_m)} m high overlap at their start {distance_m:.2f} m from the "
-        "middle; choose a greater one, or smaller bodies (body.age_months)"
-    )
-
-
-def _find_headings(starts: Sequence[_Start], spread_rad: float, rng: np.random.Generator) -> bool:
-    """Return whether one of some draws of all headings lets no two players overlap."""
-    for _ in range(_TRIAL_DRAWS):
-        outlines = [start.turned(rng.uniform(-spread_rad, spread_rad)) for start in starts]
-        if not any(outlines_overlap(*pair) for pair in combinations(outlines, 2)):
-            return True
-    return False
-
-
-def check_room_behind(
-    cfg: PushOutCfg, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
-) -> None:
-    """Check that players do not start in the walls or furniture round the ring.
-
-    Raises:
-        ValueError: If the farthest part of a body can be there.
-    """
-    room, spread_rad = playground.rooms[0], math.radians(cfg.spread_deg)
-    behind_m = max(farthest_back_m(start_outline(body), spread_rad) for body in bodies.values())
-    farthest_m = cfg.start_share * cfg.radius_m + behind_m
-    away_m, nearest = _nearest_furniture(room, playground)
-    wall_m = min(room.size_m[:2]) / 2.0
-    if farthest_m < min(away_m, wall_m):
-        return
-    obstacle, at_m = repr(nearest), away_m
-    if wall_m <= away_m:
-        obstacle, at_m = f"the walls of {room.name!r}", wall_m
-    raise ValueError(
-        f"playground {playground.name!r}: task.start_share={cfg.start_share} of "
-        f"task.radius_m={cfg.radius_m}: players reach {farthest_m:.2f} m from the middle of the "
-        f"ring at their start, and {obstacle} are {at_m:.2f} m away; choose a smaller one"
-    )
-
-
-def check_ring(radius_m: float, playground: PlaygroundCfg) -> None:
-    """Check that a ring fits into the first room, with all furniture outside of it.
-
-    Raises:
-        ValueError: If it does not.
-    """
-    room = playground.rooms[0]
-    if min(room.size_m[:2]) / 2.0 < radius_m:
-        raise ValueError(
-            f"playground {playground.name!r}: task.radius_m={radius_m}: the ring does not fit into "
-            f"the room {room.name!r} of {room.size_m[0]:g} x {room.size_m[1]:g} m; choose a "
-            "smaller one, or playground=simple or single_room"
-        )
-    away_m, nearest = _nearest_furniture(room, playground)
-    if away_m < radius_m:
-        raise ValueError(
-            f"playground {playground.name!r}: task.radius_m={radius_m}: {nearest!r} is in the "
-            f"ring, {away_m:.2f} m from the middle of room {room.name!r}; choose a smaller one, "
-            "or playground=simple"
-        )
-
-
-def _nearest_furniture(room: RoomCfg, playground: PlaygroundCfg) -> tuple[float, str]:
-    """Return the distance of the nearest thing from the middle of a room, metres, and its name."""
-    things = [prop for prop in playground.built_props() if is_furniture(prop)]
-    middle = room.middle_m[:2]
-    away = [(float(clearances_m(PlannedProp(thing), middle)), thing.name) for thing in things]
-    return min(away, default=(math.inf, ""))
-
-
-class Ring:
-    """A ring painted on the floor of the first room of a world.
-
-    Args:
-        world: The world.
-        radius_m: Radius.
-
-    Attributes:
-        middle: Middle, ``(2,)`` metres.
-        radius_m: The same.
-    """
-
-    def __init__(self, world: World, radius_m: float) -> None:
-        room = world.playground.rooms[0]
-        low, size = np.array(room.lower_m[:2]), np.array(room.size_m[:2])
-        self.middle: Floats = low + size / 2.0
-        self.radius_m = radius_m
-        self._world = world
-        _add_painted_disc(world, "rim", self.middle, radius_m, 0.004, _ROPE)
-        _add_painted_disc(world, "clay", self.middle, radius_m - _RIM_M, 0.006, _CLAY)
-
-    def area_share(self, body: Body) -> float:
-        """Return the share of the ring's area that is nearer to the middle than a body.
-
-        It is above 1 for a body with its pelvis outside.
-        """
-        offset = body.position[:2] - self.middle
-        return float(offset @ offset) / self.radius_m**2
-
-    def place_team(
-        self,
-        players: Sequence[Player],
-        others: Sequence[Player],
-        side_rad: float,
-        start_share: float,
-        spread_deg: float,
-        rng: np.random.Generator,
-    ) -> bool:
-        """Place a team side by side on one side of the ring, facing the middle.
-
-        The headings are drawn again while its players penetrate each other, or others, at most
-        `_MOST_DRAWS` times.
-
-        Args:
-            players: The players of the team.
-            others: Players that have been placed before.
-            side_rad: Direction of the team, seen from the middle.
-            start_share: Distance from the middle as a share of the radius.
-            spread_deg: Largest deviation of the heading from the direction of the middle.
-            rng: Random generator of the episode.
-
-        Returns:
-            Whether they do not any more.
-        """
-        angles_rad = _angles_rad(len(players), side_rad)
-        for _ in range(_MOST_DRAWS):
-            for player, angle_rad in zip(players, angles_rad, strict=True):
-                place = self.middle + _polar_point(angle_rad, start_share * self.radius_m)
-                deviation_rad = math.radians(rng.uniform(-spread_deg, spread_deg))
-                place_player(player, place, angle_rad + math.pi + deviation_rad)
-            if not self._overlap(players, others):
-                return True
-        return False
-
-    def _overlap(self, players: Sequence[Player], others: Sequence[Player]) -> bool:
-        """Return whether two of some players, or one of them and one of others, penetrate."""
-        pairs = [*combinations(players, 2), *product(players, others)]
-        return any(
-            penetration_m(self._world.client, one.body.body_id, other.body.body_id) > 0.0
-            for one, other in pairs
-        )
-
-
-def _angles_rad(players: int, side_rad: float) -> list[float]:
-    """Return the directions from the middle of the players of a team, side by side."""
-    middle_rank = (players - 1) / 2.0
-    return [side_rad + _TEAM_SPACING_RAD * (rank - middle_rank) for rank in range(players)]
-
-
-def _polar_point(direction_rad: float, distance_m: float = 1.0) -> Floats:
-    """Return the point of the floor at polar coordinates, ``(2,)`` metres."""
-    return distance_m * np.array([math.cos(direction_rad), math.sin(direction_rad)])
-
-
-def _add_painted_disc(
-    world: World, name: str, centre: Floats, radius_m: float, top_m: float, colour: Colour
-) -> None:
-    """Add a disc to the floor that is visible and has no collision.
-
-    Args:
-        world: The world.
-        name: Name of the prop.
-        centre: ``(2,)`` metres.
-        radius_m: Radius.
-        top_m: Thickness; of two overlapping discs the thicker one is visible.
-        colour: Red, green, blue in [0, 1].
-    """
-    world.add_prop(
-        PropCfg(
-            name=name,
-            shape=PropShape.cylinder,
-            size_m=[radius_m, top_m],
-            position_m=(float(centre[0]), float(centre[1]), top_m / 2),
-            colour=colour,
-            tangible=False,
-        )
-    )
+_RESTARTS = 20
 
 
 def opponents(player: Player, players: Sequence[Player]) -> list[Player]:
@@ -298,6 +64,11 @@ class PushOutCfg(TaskCfg):
         if not 0.0 <= self.spread_deg <= 180.0:
             raise ValueError(f"task.spread_deg={self.spread_deg} must be in [0, 180]")
 
+    @property
+    def start(self) -> RingStart:
+        """Where players start."""
+        return RingStart(self.radius_m, self.start_share, self.spread_deg)
+
 
 class PushOut(Task):
     """Two teams in a ring; a player outside is out, and the team that remains wins."""
@@ -313,8 +84,8 @@ class PushOut(Task):
     def check_distances(
         cls, cfg: Any, playground: PlaygroundCfg, bodies: Mapping[str, BodyCfg]
     ) -> None:
-        check_starts(cfg, cls.teams_of(cfg), bodies)
-        check_room_behind(cfg, playground, bodies)
+        check_starts(cfg.start, cls.teams_of(cfg), bodies)
+        check_room_behind(cfg.start, playground, bodies)
 
     def build(self) -> None:
         self.ring = Ring(self.world, self.cfg.radius_m)
@@ -329,8 +100,8 @@ class PushOut(Task):
         # the headings of one team may leave none to the other: then both are drawn again
         if not any(self._place_teams(side_rad, rng) for _ in range(_RESTARTS)):
             raise ValueError(
-                f"task.start_share={self.cfg.start_share} of task.radius_m={self.cfg.radius_m}: "
-                f"players overlap in each of {_RESTARTS} starts; choose a greater one"
+                f"{self.cfg.start}: players overlap in each of {_RESTARTS} starts; choose a "
+                "greater one"
             )
         direct_gaze_ahead(self.players)
         self._playing = {player.name for player in self.players}
@@ -340,10 +111,10 @@ class PushOut(Task):
 
     def _place_teams(self, side_rad: float, rng: np.random.Generator) -> bool:
         """Place all teams, the first one on a side; return whether nobody overlaps."""
-        share, spread_deg, before = self.cfg.start_share, self.cfg.spread_deg, list[Player]()
+        before = list[Player]()
         for number, name in enumerate(self._team_names):
             team, team_side_rad = self._team(name), side_rad + number * math.pi
-            if not self.ring.place_team(team, before, team_side_rad, share, spread_deg, rng):
+            if not self.ring.place_team(team, before, team_side_rad, self.cfg.start, rng):
                 return False
             before += team
         return True

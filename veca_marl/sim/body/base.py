@@ -33,6 +33,7 @@ from veca_marl.sim.body.sense_organs import (
     Sight,
     Visible,
     interactable_props,
+    other_eye_m,
     palm_centre,
     resting_mount,
 )
@@ -313,10 +314,17 @@ class Body(ABC):
         """Return the pose of a sense organ, one of `MOUNTS`; eyes look along their x axis."""
         head = Pose(self._drawn.positions[self._head], self._drawn.rotations[self._head])
         organ = resting_mount(name, head, self._head_size)
-        return self._gaze.turned(name, self._kept_eye(name, organ)) if name in EYES else organ
+        if name not in EYES:
+            return organ
+        return self._gaze.turned(name, self._kept_eye(organ, other_eye_m(name, self._head_size)))
 
-    def _kept_eye(self, name: str, eye: Pose) -> Pose:
-        """Return the pose of an eye that looks straight ahead; bodies may keep it off walls."""
+    def _kept_eye(self, eye: Pose, to_other_m: float) -> Pose:
+        """Return the pose of an eye, which bodies may keep off walls or the floor.
+
+        Args:
+            eye: Its pose when it looks straight ahead.
+            to_other_m: See `other_eye_m`.
+        """
         return eye
 
     def touches(self, prop: Prop) -> bool:

@@ -62,6 +62,11 @@ def _offsets(head_size: float) -> dict[str, Floats]:
     return offsets
 
 
+def other_eye_m(name: str, head_size: float) -> float:
+    """Return the way from an eye to the other one along the left axis of the head, metres."""
+    return -2.0 * MOUNTS_M[name][1] * head_size
+
+
 class Gaze:
     """The state of both eyes: a point at which they look, and the distance of focus.
 

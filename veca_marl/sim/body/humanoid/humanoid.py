@@ -39,7 +39,6 @@ from veca_marl.sim.body.humanoid.postures import (
     perturbed,
     posture_angles,
 )
-from veca_marl.sim.body.sense_organs import MOUNTS_M
 from veca_marl.sim.geometry import Floats, Pose, heading_rad
 from veca_marl.sim.physics import World, is_contact
 from veca_marl.sim.physics.bullet_client import BulletClient
@@ -263,14 +262,13 @@ class Humanoid(Body):
         self.articulation.place(Pose(positions[0].copy(), rotations[0].copy()), angles)
         self._start()
 
-    def _kept_eye(self, name: str, eye: Pose) -> Pose:
+    def _kept_eye(self, eye: Pose, to_other_m: float) -> Pose:
         """Return the pose of an eye, raised if one of both is below the floor or too near to it.
 
         Eyes are up to 12 mm in front of what the head collides with, and contacts give way. Both
         are raised alike, so that their distance from each other stays what it is.
         """
         height_m = float(eye.position[2])
-        to_other_m = -2.0 * MOUNTS_M[name][1] * self._head_size
         other_m = height_m + to_other_m * float(eye.rotation[2, 1])
         missing_m = _EYE_HEIGHT_M - min(height_m, other_m)
         if missing_m <= 0.0:

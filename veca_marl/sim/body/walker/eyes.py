@@ -19,7 +19,7 @@ def kept_inside(eye: Pose, to_other_m: float, centre: Floats, footprint: Footpri
 
     Args:
         eye: Pose of the eye, with the axes of the head.
-        to_other_m: Way to the other eye along the left axis of the head.
+        to_other_m: See `other_eye_m`.
         centre: ``(2,)`` metres, position of the capsule on the floor plan.
         footprint: The capsule there.
     """

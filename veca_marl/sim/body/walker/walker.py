@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action
 from veca_marl.sim.body.base import Body, BodyCfg
-from veca_marl.sim.body.sense_organs import MOUNTS_M
 from veca_marl.sim.body.walker.actions import (
     REFUSED,
     VERB,
@@ -109,8 +108,7 @@ class Walker(Body):
         """The capsule in use on the floor plan."""
         return self._motion.capsule.footprint
 
-    def _kept_eye(self, name: str, eye: Pose) -> Pose:
-        to_other_m = -2.0 * MOUNTS_M[name][1] * self._head_size
+    def _kept_eye(self, eye: Pose, to_other_m: float) -> Pose:
         return kept_inside(eye, to_other_m, self._motion.ground, self.footprint)
 
     def touches(self, prop: Prop) -> bool:
