@@ -15,6 +15,7 @@ from veca_marl.sim.body.anatomy import Build, Skeleton, body_files, bone_of
 from veca_marl.sim.body.humanoid.body_dynamics import NEW_POSE, BodyDynamics
 from veca_marl.sim.body.humanoid.bone_ends import bone_ends
 from veca_marl.sim.body.humanoid.link_tree import JointLimits, read_tree
+from veca_marl.sim.body.humanoid.separation import separating_shifts
 from veca_marl.sim.geometry import Floats, Pose, cross, matrix_to_quaternion
 from veca_marl.sim.physics.bullet_client import BulletClient, JointInfo, pybullet
 
@@ -125,6 +126,7 @@ class Articulation:
         strengths_nm: ``(82,)`` N m, the greatest torque of each joint; 0 for fixed joints.
         damping: ``(82,)`` N m s/rad.
         dynamics: Mass matrix and momentum.
+        mass_kg: Of the whole body.
     """
 
     def __init__(
@@ -155,7 +157,7 @@ class Articulation:
         tree = read_tree(client, self.body_id)
         ends = bone_ends(client, self.body_id, skeleton, tree, self._base_centre)
         self.dynamics = BodyDynamics(tree, limits, ends, self.damping[self.moving])
-        self._mass_kg = float(self.dynamics.tree.masses.sum())
+        self.mass_kg = float(self.dynamics.tree.masses.sum())
         self._weight = np.zeros(3)  # N
         self.read_gravity()
         self._prepare(infos, {bone.name for bone in skeleton.bones})
@@ -231,9 +233,28 @@ class Articulation:
         self._set_velocity(state.velocity)
         return True
 
+    def keep_apart(self, others: Iterable[Articulation]) -> None:
+        """Move this body and others that have settled apart if they are too deep in each other.
+
+        See `separation`.
+        """
+        for other in others:
+            share = other.mass_kg / (self.mass_kg + other.mass_kg)
+            shifts = separating_shifts(self._client, self.body_id, other.body_id, share)
+            if shifts is not None:
+                self.shift(shifts[0])
+                other.shift(shifts[1])
+
+    def shift(self, by: Floats) -> None:
+        """Move the body by ``(3,)`` metres; its velocity and its joints stay as they are."""
+        state = self.dynamics.state
+        state.position[:] += by
+        self._set_pose(state.position, self.dynamics.solver.quaternion)
+        self._set_velocity(state.velocity)
+
     def read_gravity(self) -> None:
         """Read the client's gravity; call it before each agent step."""
-        self._weight = self._mass_kg * np.array(self._client.gravity())
+        self._weight = self.mass_kg * np.array(self._client.gravity())
 
     def _touches_others(self) -> bool:
         found = self._client.getContactPoints(bodyA=self.body_id)

@@ -10,6 +10,7 @@ K, damping D and horizon h; that is a fourth of K for a horizon of one agent ste
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -385,6 +386,13 @@ class Humanoid(Body):
     def after_substep(self, substep_s: float) -> None:
         """Read the state, apply the limits of the joints and restore the momentum."""
         self._finite = self._finite and self.articulation.settle(substep_s)
+        if self._finite:
+            self.articulation.keep_apart(self._settled())
+
+    def _settled(self) -> list[Articulation]:
+        """Return the bones of the joint-level bodies that move before this one."""
+        earlier = itertools.takewhile(lambda mover: mover is not self, self._world.movers)
+        return [mover.articulation for mover in earlier if isinstance(mover, Humanoid)]
 
     def _start(self) -> None:
         """Begin at rest in the present pose."""
