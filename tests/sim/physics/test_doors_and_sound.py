@@ -148,7 +148,7 @@ def test_an_open_leaf_between_source_and_listener_in_one_room_is_a_screen(build)
     """It stands at y = 0.93, from x = 3.07 to 4.05."""
     world = build(flat(HINGE))
     ends = (3.6, 0.5, 1.0), (3.6, 1.4, 1.0)
-    assert loss_db(world, *ends) == 0.0
+    assert loss_db(world, *ends) < 0.01
     world.prop("leaf_door").set_opening(1.0)
     assert world.prop("leaf_door").bounds()[1][0] > 4.0
     assert 3.0 < loss_db(world, *ends) < LOSS_DB - 6.0

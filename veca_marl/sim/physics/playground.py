@@ -18,8 +18,8 @@ from veca_marl.sim.physics.impact_sounds import ImpactCfg
 from veca_marl.sim.physics.props import PropCfg, PropShape, check_appearance
 from veca_marl.sim.physics.rooms import DoorCfg, RoomCfg
 from veca_marl.sim.sound import House, Room
-from veca_marl.sim.sound.obstacles import Doorway
 from veca_marl.sim.sound.partitions import MOST_LOSS_DB, TRANSMISSION_LOSS_DB
+from veca_marl.sim.sound.screens import Doorway
 
 THICKEST_WALL_M = 0.5
 """The threshold of a door lies within the wall, at most so far from either room."""

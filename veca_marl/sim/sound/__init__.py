@@ -1,5 +1,6 @@
 """Sound: sources, waveforms, room acoustics and propagation."""
 
+from veca_marl.sim.sound.house import House
 from veca_marl.sim.sound.propagation import Receiver
 from veca_marl.sim.sound.room_acoustics import NEAR_FIELD_M, SPEED_OF_SOUND_MPS, Room
 from veca_marl.sim.sound.soundfield import Listener, SoundField
@@ -15,7 +16,6 @@ from veca_marl.sim.sound.sounds import (
     Voice,
     make_sound,
 )
-from veca_marl.sim.sound.surroundings import House
 from veca_marl.sim.sound.waveforms import (
     CALLS,
     SAMPLE_RATE_HZ,

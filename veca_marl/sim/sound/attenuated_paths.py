@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.diffraction import add_measure, energy_past
-from veca_marl.sim.sound.obstacles import contains_point
 from veca_marl.sim.sound.partitions import N_BANDS
+from veca_marl.sim.sound.screens import contains_point
 from veca_marl.sim.sound.silhouettes import (
     Line,
     Screens,
@@ -72,13 +72,12 @@ def energies_inside(
     """
     used = _not_round(room.numbers, source, head, screens)
     energies = np.ones((len(lattice), N_BANDS))
-    all_of_it = np.zeros((0, 3)), np.zeros((0, 3))
     work = make_work(_most_silhouettes(len(used), len(used), lattice))
     image = np.empty(3)
     for k in range(len(lattice)):
         _write_image(source, room, lattice[k], image)
         _write_energy(
-            head, image, room, lattice[k], (used, used), all_of_it, screens, surface_ratio, work,
+            head, image, room, lattice[k], (used, used), False, screens, surface_ratio, work,
             energies[k],
         )  # fmt: skip
     return energies
@@ -92,7 +91,6 @@ def energies_between(
     other: Reflector,
     lattice: Numbers,
     between: Numbers,
-    rooms: tuple[Floats, Floats],
     screens: Screens,
     surface_ratio: float,
 ) -> Floats:
@@ -105,7 +103,6 @@ def energies_between(
         other: The head's room.
         lattice: ``(K, 3)`` from `image_lattice`.
         between: Numbers of the screens that count between rooms.
-        rooms: Lower and upper corners ``(rooms, 3)`` of all rooms.
         screens: All screens.
         surface_ratio: See `partitions.energy_through`.
 
@@ -123,7 +120,7 @@ def energies_between(
     for k in range(n):
         _write_image(source, room, lattice[k], image)
         _write_energy(
-            head, image, room, lattice[k], (first, later), rooms, screens, surface_ratio, work,
+            head, image, room, lattice[k], (first, later), True, screens, surface_ratio, work,
             energies[k],
         )  # fmt: skip
     later = _not_round(other.numbers, source, head, screens)
@@ -133,7 +130,7 @@ def energies_between(
             back[axis] = lattice[k, axis] if lattice[k, axis] % 2 else -lattice[k, axis]
         _write_image(head, other, back, image)
         _write_energy(
-            source, image, other, back, (first, later), rooms, screens, surface_ratio, work,
+            source, image, other, back, (first, later), True, screens, surface_ratio, work,
             energies[n - 1 + k],
         )  # fmt: skip
     return energies
@@ -195,7 +192,7 @@ def _write_energy(
     room: Reflector,
     reflections: Numbers,
     used: tuple[Numbers, Numbers],
-    rooms: tuple[Floats, Floats],
+    crosses: bool,
     screens: Screens,
     surface_ratio: float,
     work: Work,
@@ -210,9 +207,8 @@ def _write_energy(
         room: The room that reflects it.
         reflections: ``(3,)`` copy of the room in which the image is.
         used: Numbers of the screens before the first reflection, and of those after it.
-        rooms: Lower and upper corners ``(rooms, 3)`` of all rooms: before the first reflection
-            furniture counts only for the part of the path that is in its room. Empty if all of the
-            path is in one room.
+        crosses: Whether the path leads to another room: before the first reflection furniture
+            counts only for the part of the path that is in its air, see `Screens`.
         screens: All screens.
         surface_ratio: See `partitions.energy_through`.
         work: Overwritten.
@@ -237,7 +233,7 @@ def _write_energy(
             work.sign[axis], work.offset[axis] = sign, offset
         reach = passed * length_m, until * length_m
         numbers = used[0] if is_first else used[1]
-        count = _add_leg(line, reach, numbers, is_first, rooms, screens, mirror, work, count)
+        count = _add_leg(line, reach, numbers, is_first and crosses, screens, mirror, work, count)
         if crossed < 0:
             break
         side = 1 if (way[crossed] > 0.0) == (cell[crossed] % 2 == 0) else 0
@@ -254,8 +250,7 @@ def _add_leg(
     line: Line,
     reach_m: tuple[float, float],
     numbers: Numbers,
-    is_first: bool,
-    rooms: tuple[Floats, Floats],
+    crosses: bool,
     screens: Screens,
     mirror: tuple[Floats, Floats],
     work: Work,
@@ -267,8 +262,7 @@ def _add_leg(
         line: The path.
         reach_m: Distances of the two reflections, or ends, from its start.
         numbers: Of the screens.
-        is_first: Whether this is before the first reflection.
-        rooms: See `_write_energy`.
+        crosses: See `_write_energy`; false after the first reflection.
         screens: All screens.
         mirror: See `add_silhouette`.
         work: Has `count` silhouettes; more are added.
@@ -276,10 +270,11 @@ def _add_leg(
     """
     for n in numbers:
         low_m, high_m = reach_m
-        room = screens.rooms[n]
-        if is_first and 0 <= room < len(rooms[0]):
-            enter_m, leave_m = _stretch_inside(line, rooms[0][room], rooms[1][room])
+        if crosses and screens.rooms[n] >= 0:
+            enter_m, leave_m = _stretch_inside(line, screens.air[n, 0], screens.air[n, 1])
             low_m, high_m = max(low_m, enter_m), min(high_m, leave_m)
+            if low_m >= high_m:
+                continue
         depth = add_silhouette(
             line, low_m, high_m, screens, n, mirror, work, work.rectangles[count]
         )

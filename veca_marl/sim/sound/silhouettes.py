@@ -23,7 +23,10 @@ MOST_SETS = 128
 MOST_MOVING = 4
 """Leaves near one path that count as neither open nor closed; of others the nearer one counts."""
 
-_SEALED = 1e3  # Fresnel parameter over the root of the frequency of an edge that is none
+# Fresnel parameter over the root of the frequency by which an edge is moved that is none, and one
+# below which a movement is hardly heard: between them it grows exponentially, so that an edge that
+# begins to meet something does so gradually
+_SEALED, _BARELY_SEALED = 1e3, 0.02
 _STRADDLED_M = 0.05  # a joint with another wall closes a wall that the path meets so far from it
 _FAR_M, _FAR_RATIO = 6.0, 0.5  # beyond that beside a path obstacles are left out
 
@@ -40,7 +43,10 @@ class Screens(NamedTuple):
         bounds: ``(n, 3, 2)`` from 0 to 1: how far the faces in the negative and in the positive
             direction of each axis meet the floor, the ceiling or the end of the air.
         joints: ``(n, 3, 2)`` 1 for faces that meet another wall.
-        rooms: ``(n,)`` number of the room that they stand in, -1 for walls between rooms.
+        rooms: ``(n,)`` number of the room that they stand in, -1 for walls between rooms; of an
+            opening, that of the room behind it.
+        air: ``(n, 2, 3)`` metres, corners of the part of the house in which furniture counts for a
+            path between rooms: its room, and what is behind the faces that it reaches through.
         kinds: ``(n,)`` `BOX`, `LEAF`, or `CLOSED`: a leaf where it would be closed.
         opens: ``(n,)`` how far a leaf is open, from 0 to 1; -1 for boxes.
         leaves: ``(n,)`` number of the leaf, where it is and where it would be closed; -1 for boxes.
@@ -52,6 +58,7 @@ class Screens(NamedTuple):
     bounds: Floats
     joints: Floats
     rooms: NDArray[np.int64]
+    air: Floats
     kinds: NDArray[np.int64]
     opens: Floats
     leaves: NDArray[np.int64]
@@ -350,8 +357,17 @@ def _seal(
             across *= 1.0 if screens.rotations[number, world, k] > 0.0 else -1.0
             for side in range(2):
                 face = side if normal > 0.0 else 1 - side
-                moved = straddled * screens.joints[number, k, face] * normal * normal
+                moved = _sealed(straddled * screens.joints[number, k, face]) * normal * normal
                 face = side if across > 0.0 else 1 - side
                 own = min(lit[side] / _STRADDLED_M, 1.0)
-                moved = max(moved, own * screens.bounds[number, k, face] * across * across)
-                rectangle[2 * axis + side] += _SEALED * (moved if side == 1 else -moved)
+                bound = _sealed(own * screens.bounds[number, k, face]) * across * across
+                moved = max(moved, bound)
+                rectangle[2 * axis + side] += moved if side == 1 else -moved
+
+
+@kernel
+def _sealed(share: float) -> float:
+    """Return by what an edge is moved that meets something in part: a share from 0 to 1."""
+    if share <= 0.0:
+        return 0.0
+    return _BARELY_SEALED * (math.exp(share * math.log(_SEALED / _BARELY_SEALED + 1.0)) - 1.0)

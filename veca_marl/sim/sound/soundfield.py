@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Pose
+from veca_marl.sim.sound.house import House
 from veca_marl.sim.sound.propagation import Ears, Propagation, Receiver
 from veca_marl.sim.sound.room_acoustics import Room
 from veca_marl.sim.sound.signal_paths import HALF_WIDTH, make_mixer
 from veca_marl.sim.sound.sounds import Sound, Source
-from veca_marl.sim.sound.surroundings import FreeField, House, OneRoom, Surroundings
+from veca_marl.sim.sound.surroundings import FreeField, OneRoom, Surroundings
 
 REACH_M = 200.0
 """Reach of the free field, where a source of level 1 has an rms pressure of 0.005 (-46 dB)."""

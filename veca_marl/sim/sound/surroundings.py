@@ -1,16 +1,8 @@
-"""The surroundings that sound propagates in: a free field, one room, or a house of several.
-
-Image sources are right inside one box. A listener in the room of a source hears it with the
-reflections of that room, one in another room with those of both rooms, see `attenuated_paths`.
-Obstacles (walls, leaves of doors, furniture) leave a fraction of the energy of each path in each
-octave band, see `diffraction`, at their present poses. Reflections at obstacles are not modelled.
-When a listener enters another room, the sound is cross-faded over one control step.
-"""
+"""The surroundings that sound propagates in: a free field or one room; `house` has several."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,18 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.kernels import kernel
-from veca_marl.sim.sound.attenuated_paths import Reflector, energies_between, energies_inside
-from veca_marl.sim.sound.obstacles import Doorway, Obstacles, ScreenSets
-from veca_marl.sim.sound.partitions import (
-    MOST_LOSS_DB,
-    N_BANDS,
-    TRANSMISSION_LOSS_DB,
-    surface_ratio,
-)
+from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
-
-_BETWEEN_ROOMS = -1  # `paths_id` of paths between rooms is this and below; rooms have 0 and up
 
 
 @dataclass(frozen=True)
@@ -201,171 +183,3 @@ def _vectors_to_images(
                 total += (images[k, j] - head) * rotation[j, axis]
             vectors[k, axis] = total
     return vectors
-
-
-class House:
-    """Rooms and the obstacles between them. Serves a `SoundField` as its surroundings.
-
-    Attributes:
-        size: ``(3,)`` metres, the box round all rooms.
-        longest_path_m: See `Surroundings`.
-        obstacles: The walls and doors between the rooms; their owners add and move them.
-    """
-
-    def __init__(
-        self,
-        rooms: Sequence[Room],
-        image_order: int = 1,
-        transmission_loss_db: float = TRANSMISSION_LOSS_DB,
-        doorways: Sequence[Doorway] = (),
-    ) -> None:
-        """Join rooms; there are no obstacles between them yet.
-
-        Args:
-            rooms: One or more; a point outside all of them belongs to the nearest.
-            image_order: Greatest number of reflections inside a room.
-            transmission_loss_db: Loss at 500 Hz of what passes through an obstacle.
-            doorways: Openings in the walls between rooms, where these do not reflect.
-
-        Raises:
-            ValueError: If there is no room, or the loss is not from 0 to `MOST_LOSS_DB`.
-        """
-        if not rooms:
-            raise ValueError("a house needs at least one room")
-        if not 0.0 <= transmission_loss_db <= MOST_LOSS_DB:
-            raise ValueError(
-                f"transmission_loss_db={transmission_loss_db} must be from 0 to {MOST_LOSS_DB:g}"
-            )
-        self.obstacles = Obstacles()
-        self._rooms = [OneRoom(room, image_order) for room in rooms]
-        self._lattice, self._doorways = image_lattice(image_order), list(doorways)
-        self._corners = (
-            np.array([room.lower for room in rooms]),
-            np.array([room.lower + room.size for room in rooms]),
-        )
-        self._lowest, self._highest = self._corners[0].min(axis=0), self._corners[1].max(axis=0)
-        self.size: Floats = self._highest - self._lowest
-        longest_m = [room.longest_path_m for room in self._rooms]
-        self.longest_path_m = max(float(np.linalg.norm(self.size)), *longest_m)
-        if len(rooms) > 1:  # a source outside of the room that reflects it
-            self.longest_path_m += float(np.linalg.norm(self.size))
-        self._surface_ratio = surface_ratio(transmission_loss_db)
-        self._screens_of: tuple[int, ScreenSets] | None = None
-
-    @property
-    def changes(self) -> int:
-        """See `Surroundings`: the obstacles that were added or moved."""
-        return self.obstacles.changes
-
-    def room_of(self, position: Floats) -> int:
-        """Return the number of the room that contains a point ``(3,)``, or else of the nearest."""
-        return int(nearest_box(position, *self._corners))
-
-    def arrivals(self, source: Floats, head: Pose) -> Arrivals:
-        """See `Surroundings`."""
-        room, other = self.room_of(source), self.room_of(head.position)
-        if room != other:
-            return self._arrivals_between(room, other, source, head)
-        inside = self._rooms[room].arrivals(source, head)
-        energies = self._energies_inside(room, source, head.position, self._lattice)
-        return Arrivals(inside.vectors, inside.gains, room, energies)
-
-    def _energies_inside(
-        self, room: int, source: Floats, head: Floats, lattice: NDArray[np.int64]
-    ) -> Floats | None:
-        """Return the energies ``(K, N_BANDS)`` of paths in a room, None if nothing is lost."""
-        sets, one = self._screens, self._rooms[room]
-        if not (len(sets.inside[room]) or len(sets.openings[room].kinds)):
-            return None
-        energies: Floats = energies_inside(
-            one.bounded(source),
-            one.bounded(head),
-            self._reflector(room),
-            lattice,
-            sets.screens,
-            self._surface_ratio,
-        )
-        return None if (energies == 1.0).all() else energies
-
-    def _reflector(self, room: int) -> Reflector:
-        """Return a room with what stands in it and the doorways in its walls."""
-        sets, walls = self._screens, self._rooms[room].room
-        return Reflector(walls.lower, walls.size, sets.inside[room], sets.openings[room])
-
-    def _arrivals_between(self, room: int, other: int, source: Floats, head: Pose) -> Arrivals:
-        """Return how a source in one room arrives at a head in another one."""
-        source, position = self._clamp(source), self._clamp(head.position)
-        energies = self._energies_between(room, other, source, position, self._lattice)
-        one, two = self._rooms[room], self._rooms[other]
-        images = np.concatenate(
-            [
-                image_sources(source, one.room.lower, one.room.size, self._lattice),
-                image_sources(source, two.room.lower, two.room.size, self._lattice[1:]),
-            ]
-        )
-        paths_id = _BETWEEN_ROOMS - room * len(self._rooms) - other
-        gains = np.concatenate([one.gains, two.gains[1:]])
-        return Arrivals((images - position) @ head.rotation, gains, paths_id, energies)
-
-    def _energies_between(
-        self, room: int, other: int, source: Floats, head: Floats, lattice: NDArray[np.int64]
-    ) -> Floats:
-        """Return the energies of paths between rooms, see `energies_between`."""
-        sets = self._screens
-        energies: Floats = energies_between(
-            source,
-            head,
-            self._reflector(room),
-            self._reflector(other),
-            lattice,
-            sets.between,
-            self._corners,
-            sets.screens,
-            self._surface_ratio,
-        )
-        return energies
-
-    def direct_energy(self, source: Floats, head: Floats) -> Floats:
-        """Return which fraction of the energy obstacles leave of the direct sound.
-
-        Args:
-            source: ``(3,)`` metres.
-            head: ``(3,)`` metres.
-
-        Returns:
-            ``(N_BANDS,)`` from 0 to 1, see `partitions.BANDS_HZ`.
-        """
-        room, other = self.room_of(source), self.room_of(head)
-        if room != other:
-            ends = self._clamp(source), self._clamp(head)
-            between: Floats = self._energies_between(room, other, *ends, image_lattice(0))[0]
-            return between
-        energies = self._energies_inside(room, source, head, image_lattice(0))
-        return np.ones(N_BANDS) if energies is None else energies[0]
-
-    @property
-    def _screens(self) -> ScreenSets:
-        """The screens at the present poses of the obstacles."""
-        if self._screens_of is None or self._screens_of[0] != self.obstacles.changes:
-            found = self.obstacles.screens(*self._corners, self._doorways)
-            self._screens_of = self.obstacles.changes, found
-        return self._screens_of[1]
-
-    def _clamp(self, position: Floats) -> Floats:
-        """Return the nearest point in the box round all rooms."""
-        nearest: Floats = np.minimum(np.maximum(position, self._lowest), self._highest)
-        return nearest
-
-
-@kernel
-def nearest_box(point: Floats, lower: Floats, upper: Floats) -> int:
-    """Return which of the boxes ``(n, 3)`` is nearest to a point ``(3,)``, the first of equals."""
-    nearest, least = 0, np.inf
-    for n in range(len(lower)):
-        outside = 0.0
-        for axis in range(3):
-            out = max(lower[n, axis] - point[axis], point[axis] - upper[n, axis], 0.0)
-            outside += out * out
-        if outside < least:
-            nearest, least = n, outside
-    return nearest

@@ -272,7 +272,7 @@ class SoundObstacle(Protocol):
 
 def make_obstacles(
     boxes: Sequence[Geom],
-    joint: JointCfg | None,
+    cfg: PropCfg,
     body_id: int,
     client: BulletClient,
     obstacles: Obstacles,
@@ -281,23 +281,23 @@ def make_obstacles(
 
     Args:
         boxes: In the frame of the prop.
-        joint: Its joint; with one it is a leaf.
+        cfg: The prop. With a joint it is a leaf.
         body_id: PyBullet's id of the prop.
         client: The PyBullet client.
         obstacles: Those of its world.
     """
-    if joint is None:
-        return [_FreeBox(box, obstacles) for box in boxes]
-    return [_Leaf(box, joint, body_id, client, obstacles) for box in boxes]
+    if cfg.joint is None:
+        return [_FreeBox(box, cfg.mass_kg == 0.0, obstacles) for box in boxes]
+    return [_Leaf(box, cfg.joint, body_id, client, obstacles) for box in boxes]
 
 
 class _FreeBox:
     """A box of a prop without a joint."""
 
-    def __init__(self, box: Geom, obstacles: Obstacles) -> None:
+    def __init__(self, box: Geom, fixed: bool, obstacles: Obstacles) -> None:
         self._offset, self._turn = np.asarray(box.offset), np.asarray(box.rotation)
         self._obstacles = obstacles
-        self._number = obstacles.add(box.size)
+        self._number = obstacles.add(box.size, fixed)
 
     def move(self, position: Floats, rotation: Floats) -> None:
         """See `SoundObstacle`."""

@@ -200,7 +200,7 @@ class Prop:
         self._centre = frame.position if frame.position.any() else None
         self._axes = frame.rotation if is_turned(frame) else None
         boxes = sound_obstacles(cfg, geoms)
-        self._obstacles = make_obstacles(boxes, cfg.joint, self.body_id, client, obstacles)
+        self._obstacles = make_obstacles(boxes, cfg, self.body_id, client, obstacles)
         self.place(cfg.position_m, math.radians(cfg.yaw_deg))
 
     @property
