@@ -2,9 +2,10 @@
 
 One process plays rounds: rude actions in every task, then a short training run with worker
 processes. After each round it counts its memory, open files, processes, shared memory and the
-processor time of a step, in units of a fixed workload. Beside it, a second process gives random
-content to the parsers, and a third one tries random configurations. The figures go to a page,
-docs/reliability.md; the exit status is 1 if anything grew or failed.
+processor time of a step, in units of a fixed workload. Beside it, a second process plays rude
+actions only, a third one gives random content to the parsers, and a fourth one tries random
+configurations, 10 000 in an hour. The figures go to a page, docs/reliability.md; the exit status is
+1 if anything grew or failed.
 
     python -m tools.soak minutes=60 to=docs/reliability.md
 """
@@ -35,7 +36,7 @@ import torch
 
 import veca_marl
 from tools.checkout import check_imported
-from tools.soak_page import Configurations, Parsers, Sample, Soak, page
+from tools.soak_page import Actions, Configurations, Parsers, Sample, Soak, page
 from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.bench.command import machine_line
 from veca_marl.bench.rollouts import ReferenceWorkload
@@ -47,11 +48,12 @@ from veca_marl.processes.children import end_of
 
 _ROOT = Path(__file__).parents[1]
 _HELPERS = _ROOT / "tests" / "helpers"
-_STEPS = 300  # of each task in a round
+_STEPS = 600  # of each task in a round
 _OBSERVED_EVERY = 5
 _CONFIGURATION_S = 120
 _CHANGES = 15  # of each set of presets, which Hydra composes once
-_BESIDE = ("parsers", "configurations")
+_CONFIGURATIONS = 10_000 / 60.0  # of each minute; then their process leaves its core to the others
+_BESIDE = ("parsers", "configurations", "actions")
 _LARGEST_BYTES = 8 * 2**30  # address space of what tries configurations: others use the memory too
 _SHARED_MEMORY = Path("/dev/shm")
 _RUN = (
@@ -75,7 +77,7 @@ class SoakOptions:
         seed: Chooses actions and configurations.
         to: File of the page.
         part: ``all``, or what runs beside the worlds and prints its results: ``parsers``,
-            ``configurations``.
+            ``configurations``, ``actions``.
     """
 
     minutes: float = 60.0
@@ -192,6 +194,15 @@ def play_rounds(minutes: float, seed: int) -> tuple[list[Sample], list[str]]:
     return samples, worlds.problems
 
 
+def play_actions(until: float, seed: int) -> Actions:
+    """Play rounds of rude actions until a time of `time.monotonic`."""
+    worlds, rounds = Worlds(seed), 0
+    while time.monotonic() < until:
+        worlds.round(rounds)
+        rounds += 1
+    return Actions(worlds.actions, worlds.problems)
+
+
 def try_parsers(minutes: float) -> Parsers:
     """Run the tests of the parsers with many examples."""
     examples = round(10 + 2 * minutes)
@@ -211,13 +222,13 @@ def try_parsers(minutes: float) -> Parsers:
     return Parsers(examples, done.stdout.splitlines()[-1] if done.stdout else "", lines)
 
 
-def try_configurations(until: float, seed: int) -> Configurations:
-    """Try random configurations until a time of `time.monotonic`."""
+def try_configurations(until: float, most: float, seed: int) -> Configurations:
+    """Try random configurations until a time of `time.monotonic`, at most so many."""
     drawn = import_module("random_configurations")
     resource.setrlimit(resource.RLIMIT_AS, (_LARGEST_BYTES, _LARGEST_BYTES))
     signal.signal(signal.SIGALRM, _too_long)
     found, number = Configurations(), 1_000_000 * (seed + 1)
-    while time.monotonic() < until:
+    while time.monotonic() < until and found.tried < most:
         rng, number = random.Random(number), number + 1
         presets = drawn.draw_presets(rng)
         words = presets + drawn.draw_changes(rng, presets)
@@ -276,9 +287,13 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
     if options.part == "parsers":
         print(json.dumps(asdict(try_parsers(options.minutes))))
         return
+    until = time.monotonic() + 60.0 * options.minutes
     if options.part == "configurations":
-        until = time.monotonic() + 60.0 * options.minutes
-        print(json.dumps(asdict(try_configurations(until, options.seed))))
+        most = _CONFIGURATIONS * options.minutes
+        print(json.dumps(asdict(try_configurations(until, most, options.seed))))
+        return
+    if options.part == "actions":
+        print(json.dumps(asdict(play_actions(until, options.seed + 1))))
         return
     file = check_file(options.to, "to")
     line = machine_line()
@@ -295,17 +310,18 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
             for process in beside:
                 process.kill()
         printed = [_lines(file) for file in outputs]
-    parsers = Parsers(0, "", [])
-    configurations = Configurations()
+    parsers, configurations, actions = Parsers(0, "", []), Configurations(), Actions()
     for part, process, lines in zip(_BESIDE, beside, printed, strict=True):
         if process.returncode:
             at = f" at: {lines[-1]}" if lines else ""
             problems.append(f"the process of the {part} {end_of(process.returncode)}{at}")
         elif part == "parsers":
             parsers = Parsers(**json.loads(lines[-1]))
-        else:
+        elif part == "configurations":
             configurations = Configurations(**json.loads(lines[-1]))
-    soak = Soak(line, samples, problems, parsers, configurations, options.seed)
+        else:
+            actions = Actions(**json.loads(lines[-1]))
+    soak = Soak(line, samples, problems, parsers, configurations, actions, options.seed)
     write_atomically(Path(file), page(soak))
     print(f"page: {file}")
     if soak.faults:

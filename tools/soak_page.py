@@ -50,6 +50,19 @@ class Configurations:
 
 
 @dataclass
+class Actions:
+    """Rude actions beside the process that is watched.
+
+    Attributes:
+        given: How many.
+        problems: What was wrong after a step.
+    """
+
+    given: int = 0
+    problems: list[str] = field(default_factory=list)
+
+
+@dataclass
 class Parsers:
     """Random content for parsers.
 
@@ -102,6 +115,7 @@ class Soak:
         problems: What was wrong after a step, or with a run.
         parsers: Random content for parsers.
         configurations: Random configurations.
+        beside: Rude actions of a second process.
         seed: Seed of the command.
     """
 
@@ -110,6 +124,7 @@ class Soak:
     problems: Sequence[str]
     parsers: Parsers
     configurations: Configurations
+    beside: Actions
     seed: int
 
     def thirds(self, quantity: Quantity) -> tuple[float, float]:
@@ -137,7 +152,8 @@ class Soak:
     def faults(self) -> list[str]:
         """All that grew or failed, one line each."""
         grown = [f"{one.name} grew: {self.thirds(one)}" for one in FLAT if self.grew(one)]
-        return [*grown, *self.problems, *self.parsers.failed, *self.configurations.failed]
+        failed = [*self.parsers.failed, *self.configurations.failed, *self.beside.problems]
+        return [*grown, *self.problems, *failed]
 
 
 _PAGE = """# Reliability
@@ -181,10 +197,8 @@ Mended since: words of a command line with a null character, without a key, with
 with a number of 5000 digits ended in a traceback or in two lines; `senses.vision.width=1e9` was
 accepted and filled the memory of the machine (13.8 GB) until the system killed the process;
 `playground.walls={{a:1}}` of a stored run without walls, a name of a SOFA file that is too long,
-`task.turn_deg=1e308`, `task.aside_m=-0.0` and a capsule of 1e9 m ended in other errors.
-
-Not mended: 5000 physics steps in a step of four joint-level bodies take more than the two minutes
-that are waited for.
+`task.turn_deg=1e308`, `task.aside_m=-0.0` and a capsule of 1e9 m ended in other errors;
+`clock.substeps=5000` was played, with minutes for a step of four joint-level bodies.
 
 ## What is not covered
 
@@ -227,8 +241,8 @@ def page(soak: Soak) -> str:
         machine=soak.machine,
         tasks=len(veca_marl.list_tasks()),
         rounds=len(soak.samples),
-        actions=last.actions,
-        problems=len(soak.problems),
+        actions=last.actions + soak.beside.given,
+        problems=len(soak.problems) + len(soak.beside.problems),
         tried=soak.configurations.tried,
         refused=soak.configurations.refused,
         failed=len(soak.configurations.failed),

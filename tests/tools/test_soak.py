@@ -3,12 +3,14 @@
 import pytest
 
 import veca_marl
-from tools.soak_page import FLAT, Configurations, Parsers, Sample, Soak, page
+from tools.soak_page import FLAT, Actions, Configurations, Parsers, Sample, Soak, page
 
 
 def soak(*memory_mb, step=3.0, files=20, problems=()):
     samples = [Sample(float(k), mb, files, 1, 0.0, step, 100 * k) for k, mb in enumerate(memory_mb)]
-    return Soak("one", samples, list(problems), Parsers(20, "8 passed", []), Configurations(), 0)
+    return Soak(
+        "one", samples, list(problems), Parsers(20, "8 passed", []), Configurations(), Actions(7), 0
+    )
 
 
 def test_the_first_round_fills_caches():
@@ -32,6 +34,10 @@ def test_problems_are_faults_and_on_the_page():
     found = soak(1.0, 1.0, 1.0, problems=["round 2, TurnBaby, step 3: not finite"])
     assert found.faults == ["round 2, TurnBaby, step 3: not finite"]
     assert found.faults[0] in page(found)
+
+
+def test_actions_of_both_processes_are_counted():
+    assert f"{200 + 7} |" in page(soak(1.0, 1.0, 1.0))
 
 
 def test_every_quantity_is_a_field_of_a_sample():

@@ -231,6 +231,8 @@ class House:
     def _nearest_doorway(self, room: int, source: Floats, head: Floats) -> _Way | None:
         """Return the doorway that counts for a path in a room; None if none is near."""
         openings = self._screens.openings[room]
+        if not len(openings.kinds):
+            return None
         number, of_source, of_head = nearest_opening(source, head, openings)
         if number < 0:
             return None
