@@ -29,6 +29,14 @@ def test_what_is_stored_is_not_played_again(stored):
     assert make_table(stored, WORDS) == text
 
 
+def test_a_table_of_stored_scores_needs_neither_recording_nor_run(stored, tmp_path):
+    scores = tmp_path / "KickTheBall" / "scores_bc_2.json"
+    scores.write_text(json.dumps(STORED))
+    options = TableOptions(**{**vars(stored), "algos": ["bc"]})
+    assert make_table(options, WORDS).count("1.00 [0.50, 1.50]") == 3
+    assert not (tmp_path / "KickTheBall" / "demonstrations").exists()
+
+
 @pytest.mark.parametrize(
     ("changed", "words", "named"),
     [

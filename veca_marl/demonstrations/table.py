@@ -102,12 +102,11 @@ def _scores(
     cfg = compose([f"+task={task}", *overrides])
     _check_frozen(cfg)
     _check_choices(folder / task / _CHOICES, options, overrides)
-    demonstrations = _recorded(options, folder / task / "demonstrations", cfg, overrides)
     found = {}
-    for player, make in _players(options, folder / task, cfg, demonstrations, overrides):
+    for player, prepare in _players(options, folder / task, cfg, overrides):
         file = folder / task / f"scores_{player}_{options.frozen}.json"
         if not file.exists():
-            row = _played(cfg, make, options.frozen)
+            row = _played(cfg, prepare(), options.frozen)
             write_atomically(file, json.dumps(row, indent=1) + "\n")
         found[player] = read_json(file)
     return found
@@ -147,34 +146,50 @@ def _recorded(options: TableOptions, folder: Path, cfg: Config, overrides: Seque
     return folder
 
 
-def _players(
-    options: TableOptions,
-    folder: Path,
-    cfg: Config,
-    demonstrations: Path,
-    overrides: Sequence[str],
-) -> Iterator[tuple[str, Callable[[VecaEnv], nn.Module]]]:
-    """Yield the name of each player, and what makes it; runs are trained if they are missing."""
-    yield EXPERT, ExpertPolicy
-    for algo in options.algos:
-        run = folder / algo
-        progress = read_progress(run)
-        if progress is None:
-            words = [f"algo={algo}", f"demonstrations={demonstrations}", "log.video=false"]
-            api.train(cfg.task.name, seed=options.seed, folder=run, overrides=[*words, *overrides])
-        elif not progress.ended:
-            raise ConfigError(
-                f"{run} is not complete: python -m veca_marl.train resume={run} continues it"
-            )
+Policy = Callable[[VecaEnv], nn.Module]
+"""Makes a policy for an environment."""
 
-        def learnt(env: VecaEnv, run: Path = run) -> nn.Module:
-            return InTurn(list(stored_actors(cfg, run, team_specs(env)).values()))
+
+def _players(
+    options: TableOptions, folder: Path, cfg: Config, overrides: Sequence[str]
+) -> Iterator[tuple[str, Callable[[], Policy]]]:
+    """Yield the name of each player, and what makes it: with what it learns from, if it is missing.
+
+    What has its scores already is not made: recordings and runs may be elsewhere by then.
+    """
+    yield EXPERT, lambda: ExpertPolicy
+    for algo in options.algos:
+
+        def learnt(algo: str = algo) -> Policy:
+            run = _learnt(options, folder, algo, cfg, overrides)
+            return lambda env: InTurn(list(stored_actors(cfg, run, team_specs(env)).values()))
 
         yield algo, learnt
-    yield RANDOM, lambda env: RandomTeams(env, list(env.group_map))
+    yield RANDOM, lambda: lambda env: RandomTeams(env, list(env.group_map))
 
 
-def _played(cfg: Config, make: Callable[[VecaEnv], nn.Module], episodes: int) -> Row:
+def _learnt(
+    options: TableOptions, folder: Path, algo: str, cfg: Config, overrides: Sequence[str]
+) -> Path:
+    """Return the folder of a run that has learnt from demonstrations, which is trained if needed.
+
+    Raises:
+        ConfigError: If it was interrupted.
+    """
+    run = folder / algo
+    progress = read_progress(run)
+    if progress is None:
+        demonstrations = _recorded(options, folder / "demonstrations", cfg, overrides)
+        words = [f"algo={algo}", f"demonstrations={demonstrations}", "log.video=false"]
+        api.train(cfg.task.name, seed=options.seed, folder=run, overrides=[*words, *overrides])
+    elif not progress.ended:
+        raise ConfigError(
+            f"{run} is not complete: python -m veca_marl.train resume={run} continues it"
+        )
+    return run
+
+
+def _played(cfg: Config, make: Policy, episodes: int) -> Row:
     """Play the first frozen episodes and return the scores."""
     seed = find_benchmark(cfg.task.name).seed
     torch.set_num_threads(1)
