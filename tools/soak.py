@@ -2,8 +2,8 @@
 
 One process plays rounds: rude actions in every task, then a short training run with worker
 processes. After each round it counts its memory, open files, processes, shared memory and the
-processor time of a step, in units of a fixed workload. Beside it, a second process plays rude
-actions only, a third one gives random content to the parsers, and a fourth one tries random
+processor time of a step, in units of a fixed workload. Beside it, a process for each further core,
+at least one, plays rude actions only, one gives random content to the parsers, and one tries random
 configurations, 10 000 in an hour. The figures go to a page, docs/reliability.md; the exit status is
 1 if anything grew or failed.
 
@@ -45,6 +45,7 @@ from veca_marl.config.command_line import CommandLine, check_file
 from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.processes.children import end_of
+from veca_marl.processes.cores import usable_cores
 
 _ROOT = Path(__file__).parents[1]
 _HELPERS = _ROOT / "tests" / "helpers"
@@ -293,15 +294,19 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
         print(json.dumps(asdict(try_configurations(until, most, options.seed))))
         return
     if options.part == "actions":
-        print(json.dumps(asdict(play_actions(until, options.seed + 1))))
+        print(json.dumps(asdict(play_actions(until, options.seed))))
         return
     file = check_file(options.to, "to")
     line = machine_line()
-    words = [f"minutes={options.minutes}", f"seed={options.seed}"]
+    parts = [*_BESIDE[:-1], *_BESIDE[-1:] * max(usable_cores() - 1, 1)]
     with ExitStack() as files:
-        outputs = [files.enter_context(TemporaryFile("w+")) for _ in _BESIDE]
-        parts = [f"part={part}" for part in _BESIDE]
-        beside = [_start(to, *words, part) for to, part in zip(outputs, parts, strict=True)]
+        outputs = [files.enter_context(TemporaryFile("w+")) for _ in parts]
+        beside = [
+            _start(
+                to, f"minutes={options.minutes}", f"seed={options.seed + number}", f"part={part}"
+            )
+            for number, (to, part) in enumerate(zip(outputs, parts, strict=True))
+        ]
         try:
             samples, problems = play_rounds(options.minutes, options.seed)
             for process in beside:
@@ -311,7 +316,7 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
                 process.kill()
         printed = [_lines(file) for file in outputs]
     parsers, configurations, actions = Parsers(0, "", []), Configurations(), Actions()
-    for part, process, lines in zip(_BESIDE, beside, printed, strict=True):
+    for part, process, lines in zip(parts, beside, printed, strict=True):
         if process.returncode:
             at = f" at: {lines[-1]}" if lines else ""
             problems.append(f"the process of the {part} {end_of(process.returncode)}{at}")
@@ -320,7 +325,8 @@ def run(options: SoakOptions, overrides: list[str]) -> None:
         elif part == "configurations":
             configurations = Configurations(**json.loads(lines[-1]))
         else:
-            actions = Actions(**json.loads(lines[-1]))
+            more = Actions(**json.loads(lines[-1]))
+            actions = Actions(actions.given + more.given, actions.problems + more.problems)
     soak = Soak(line, samples, problems, parsers, configurations, actions, options.seed)
     write_atomically(Path(file), page(soak))
     print(f"page: {file}")

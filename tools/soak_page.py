@@ -51,7 +51,7 @@ class Configurations:
 
 @dataclass
 class Actions:
-    """Rude actions beside the process that is watched.
+    """Rude actions of the processes beside the one that is watched.
 
     Attributes:
         given: How many.
@@ -115,7 +115,7 @@ class Soak:
         problems: What was wrong after a step, or with a run.
         parsers: Random content for parsers.
         configurations: Random configurations.
-        beside: Rude actions of a second process.
+        beside: Rude actions of other processes.
         seed: Seed of the command.
     """
 
