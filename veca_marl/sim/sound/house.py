@@ -102,14 +102,12 @@ class House:
 
     def arrivals(self, source: Floats, head: Pose) -> Arrivals:
         """See `Surroundings`."""
-        room, other = self.room_of(source), self.room_of(head.position)
+        route = self._route(source, head.position)
+        room, other = route.room, route.other
         if room == other:
-            way = self._nearest_doorway(room, source, head.position)
-            if way is None:
-                return self._arrivals_inside(room, source, head)
-            other = way.other
+            return self._arrivals_inside(room, source, head)
         ends = self._clamp(source), self._clamp(head.position)
-        energies = self._energies(room, other, source, head.position, self._lattice)
+        energies = self._energies(route, source, head.position, self._lattice)
         one, two = self._rooms[room], self._rooms[other]
         images = np.concatenate(
             [
@@ -140,23 +138,19 @@ class House:
         Returns:
             ``(N_BANDS,)`` from 0 to 1, see `partitions.BANDS_HZ`.
         """
-        room, other = self.room_of(source), self.room_of(head)
-        if room == other:
-            way = self._nearest_doorway(room, source, head)
-            other = room if way is None else way.other
-        direct: Floats = self._energies(room, other, source, head, image_lattice(0))[0]
+        route = self._route(source, head)
+        direct: Floats = self._energies(route, source, head, image_lattice(0))[0]
         return direct
 
     # ---- energies of paths
 
     def _energies(
-        self, room: int, other: int, source: Floats, head: Floats, lattice: NDArray[np.int64]
+        self, route: _Route, source: Floats, head: Floats, lattice: NDArray[np.int64]
     ) -> Floats:
         """Return the energies of the direct sound and of images in one room, or in two.
 
         Args:
-            room: The source's room.
-            other: The head's room, or the room behind the doorway that is near; or the same one.
+            route: See `_route`.
             source: ``(3,)`` metres.
             head: ``(3,)`` metres.
             lattice: ``(K, 3)`` from `image_lattice`.
@@ -164,18 +158,17 @@ class House:
         Returns:
             ``(2 K - 1, N_BANDS)``, or ``(K, N_BANDS)`` in one room.
         """
-        if room == other:
-            return self._energies_inside(room, source, head, lattice)
-        if self.room_of(source) != self.room_of(head):
-            return self._energies_between(room, other, source, head, lattice)
-        return self._energies_near(room, source, head, lattice)
+        if route.way is not None:
+            return self._energies_near(route.room, route.way, source, head, lattice)
+        if route.room == route.other:
+            return self._energies_inside(route.room, source, head, lattice)
+        return self._energies_between(route.room, route.other, source, head, lattice)
 
     def _energies_near(
-        self, room: int, source: Floats, head: Floats, lattice: NDArray[np.int64]
+        self, room: int, way: _Way, source: Floats, head: Floats, lattice: NDArray[np.int64]
     ) -> Floats:
         """Return the energies of paths in a room, of which a doorway is near to one end or both."""
-        way, n = self._nearest_doorway(room, source, head), len(lattice)
-        assert way is not None
+        n = len(lattice)
         energies = np.zeros((2 * n - 1, N_BANDS))
         shares = _shares(way.of_source, way.of_head)
         if shares[0] > 0.0:
@@ -228,6 +221,12 @@ class House:
 
     # ---- doorways
 
+    def _route(self, source: Floats, head: Floats) -> _Route:
+        """Return which rooms reflect the sound from a source ``(3,)`` to a head ``(3,)``."""
+        room, other = self.room_of(source), self.room_of(head)
+        way = self._nearest_doorway(room, source, head) if room == other else None
+        return _Route(room, other if way is None else way.other, way)
+
     def _nearest_doorway(self, room: int, source: Floats, head: Floats) -> _Way | None:
         """Return the doorway that counts for a path in a room; None if none is near."""
         openings = self._screens.openings[room]
@@ -278,6 +277,20 @@ class _Way(NamedTuple):
     other: int
     of_source: float
     of_head: float
+
+
+class _Route(NamedTuple):
+    """The rooms that reflect the sound from a source to a head.
+
+    Attributes:
+        room: The source's room.
+        other: The head's room, or the room behind a doorway that is near to a path in one room.
+        way: That doorway; None if there is none, or the path leads to another room.
+    """
+
+    room: int
+    other: int
+    way: _Way | None
 
 
 def _shares(of_source: float, of_head: float) -> tuple[float, float, float]:
