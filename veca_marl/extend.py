@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from veca_marl.envs.core.task import register_task as register_task
     from veca_marl.envs.core.task import terms as terms
     from veca_marl.sim.body.base import Body as Body
-    from veca_marl.sim.body.base import BodyCfg as BodyCfg
+    from veca_marl.sim.body.body_cfg import BodyCfg as BodyCfg
     from veca_marl.sim.body.humanoid import Humanoid as Humanoid
     from veca_marl.sim.body.humanoid import HumanoidCfg as HumanoidCfg
     from veca_marl.sim.body.registry import register_body as register_body

@@ -8,7 +8,7 @@ import pytest
 from contests import episodes, game_of, rest, total_reward
 
 from veca_marl.checks.starts import overlaps
-from veca_marl.envs.tasks.soccer import CHILD_M
+from veca_marl.envs.tasks.soccer_pitch import CHILD_M
 
 GAMES = 15
 

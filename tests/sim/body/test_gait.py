@@ -7,7 +7,8 @@ import pytest
 from walking import ball, empty_world, let_pass, walker_in
 
 from veca_marl.sim.body.anatomy import Soles, load_skeleton
-from veca_marl.sim.body.walker.gait import Gait, Neck
+from veca_marl.sim.body.walker.gait import Gait
+from veca_marl.sim.body.walker.neck import Neck
 
 SKELETON = load_skeleton()
 SOLES = Soles(SKELETON)

@@ -22,7 +22,7 @@ from veca_marl.envs.core.episodes import Episodes
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.object_states import Capture, ObjectStates, Putting
 from veca_marl.sim.physics.bullet_client import pybullet
-from veca_marl.sim.physics.world import SavedPhysics
+from veca_marl.sim.physics.world_state import SavedPhysics
 from veca_marl.stored_files import StoredFileError, read_bytes
 
 _FORMAT = 1

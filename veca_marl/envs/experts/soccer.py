@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from veca_marl.envs.core.expert import Expert, register_expert
 from veca_marl.envs.experts.control.locomotion import Clearances, bearing_rad, locomotion_of
 from veca_marl.envs.experts.control.path_following import WallRecovery
-from veca_marl.envs.tasks.soccer import ATTACKER, Pitch, Soccer
+from veca_marl.envs.tasks.soccer import ATTACKER, Soccer
+from veca_marl.envs.tasks.soccer_pitch import Pitch
 from veca_marl.sim.geometry import Floats
 
 # lateral distances of aims from the middle of the goal, as shares of its width

@@ -4,7 +4,8 @@
 """
 
 from veca_marl.sim.body.action import VoiceKind
-from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.registry import BODIES, make_body, register_body
 from veca_marl.sim.body.sense_organs import MOUNTS
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from veca_marl.registry import Registry
-from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.humanoid.humanoid import Humanoid
 from veca_marl.sim.body.walker.walker import Walker
 from veca_marl.sim.physics import World

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Geom, Scene, Shape
 from veca_marl.sim.physics.bullet import BuiltContacts
@@ -34,49 +32,13 @@ from veca_marl.sim.physics.props import (
 )
 from veca_marl.sim.physics.props.contact_corrections import FastProps, Rebounds
 from veca_marl.sim.physics.props.joint import Joint
+from veca_marl.sim.physics.world_state import (
+    BuiltState,
+    BulletSetting,
+    SavedPhysics,
+    built_state,
+)
 from veca_marl.sim.sound import SoundField, make_sound
-from veca_marl.sim.sound.sounds import Sound, Source
-
-
-@dataclass(frozen=True)
-class BuiltSound:
-    """What one source emitted when its world was frozen.
-
-    Attributes:
-        source: The source.
-        sound: Its sound; a source may emit another one later.
-        muted: Whether it was muted.
-    """
-
-    source: Source
-    sound: Sound
-    muted: bool
-
-
-@dataclass(frozen=True)
-class BuiltState:
-    """Colours and sounds of a frozen world, which episodes may change.
-
-    Attributes:
-        colours: ``(S, 3)`` of all surfaces of the scene.
-        sounds: One entry for each source.
-    """
-
-    colours: NDArray[np.float32]
-    sounds: tuple[BuiltSound, ...]
-
-    def restore(self, scene: Scene) -> None:
-        """Set the colours of the scene and the sounds of the sources to those stored here."""
-        scene.surfaces.colours[:] = self.colours
-        for built in self.sounds:
-            built.source.sound, built.source.muted = built.sound, built.muted
-
-
-def built_state(scene: Scene, sources: Mapping[str, Source]) -> BuiltState:
-    """Return the present colours of a scene and the present sounds of the sources."""
-    sounds = tuple(BuiltSound(source, source.sound, source.muted) for source in sources.values())
-    return BuiltState(scene.surfaces.colours.copy(), sounds)
-
 
 FLOOR_NAME = "floor"
 _FLOOR_THICKNESS_M = 0.1
@@ -150,29 +112,6 @@ class Mover(Protocol):
 
     def write_frames(self) -> None:
         """Write the frames of the scene and the positions of sounds, once per agent step."""
-
-
-class BulletSetting(Protocol):
-    """A setting of Bullet that changes in an episode and that Bullet's saved states lack."""
-
-    def forget(self) -> None:
-        """Undo it, before a saved state is restored."""
-
-    def apply(self) -> None:
-        """Set it as its owner says, after the state has been restored."""
-
-
-@dataclass(frozen=True)
-class SavedPhysics:
-    """What `World.save_physics` returns.
-
-    Attributes:
-        state: See `saved_state`.
-        gravity: m/s^2 along x, y and z.
-    """
-
-    state: bytes
-    gravity: tuple[float, float, float]
 
 
 _FALLING_ASLEEP = 2  # physics steps until Bullet leaves out what may sleep

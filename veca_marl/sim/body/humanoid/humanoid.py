@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action, checked_action
 from veca_marl.sim.body.anatomy import Build, Underside, forward_kinematics
-from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.humanoid.articulation import Articulation
 from veca_marl.sim.body.humanoid.joint_control import (
     JOINT_ACTIONS,

@@ -12,7 +12,8 @@ import numpy as np
 from veca_marl.sim.body.anatomy import Skeleton, Soles, forward_kinematics
 from veca_marl.sim.body.anatomy.kinematics import Underside
 from veca_marl.sim.body.walker.capsule import Capsule, lying_capsule, upright_capsule
-from veca_marl.sim.body.walker.gait import Gait, Neck, clip
+from veca_marl.sim.body.walker.gait import Gait, clip
+from veca_marl.sim.body.walker.neck import Neck
 from veca_marl.sim.body.walker.walker_cfg import WalkerCfg
 from veca_marl.sim.geometry import Floats, SceneObject
 from veca_marl.sim.physics import World

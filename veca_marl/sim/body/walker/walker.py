@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.action import Action
-from veca_marl.sim.body.base import Body, BodyCfg
+from veca_marl.sim.body.base import Body
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.actions import (
     REFUSED,
     VERB,

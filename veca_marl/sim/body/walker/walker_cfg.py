@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from veca_marl.sim.body.anatomy import REFERENCE, Growth, load_skeleton
-from veca_marl.sim.body.base import BodyCfg
+from veca_marl.sim.body.body_cfg import BodyCfg
 from veca_marl.sim.body.walker.actions import WalkActionKind
 from veca_marl.sim.physics import ClockCfg
 from veca_marl.sim.physics.interactions import check_interactions

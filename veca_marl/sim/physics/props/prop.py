@@ -1,14 +1,9 @@
-"""The props of a world: where they are, how to put them elsewhere, and their sleep at rest.
-
-Bullet puts bodies that touch each other to sleep together, once each of them may sleep, and wakes
-them when a moving body comes near. What has no mass wakes nothing in Bullet: a walker wakes the
-props within its reach, and so does the world where a fixed prop is put elsewhere.
-"""
+"""The props of a world: where they are, and how to put them elsewhere."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -24,7 +19,7 @@ from veca_marl.sim.geometry import (
     rotation_about_vertical,
 )
 from veca_marl.sim.physics.bullet import are_in_contact
-from veca_marl.sim.physics.bullet_client import BulletClient, Quaternion, Vector, pybullet
+from veca_marl.sim.physics.bullet_client import BulletClient, Quaternion, Vector
 from veca_marl.sim.physics.props.geoms import (
     bounding_box,
     horizontal_radius_m,
@@ -39,16 +34,6 @@ from veca_marl.sim.physics.props.prop_cfg import PropCfg
 from veca_marl.sim.physics.props.rigid_body import create_body, is_turned, pose_reader
 from veca_marl.sim.sound import Source
 from veca_marl.sim.sound.obstacles import Obstacles
-
-REST_SPEED = 0.01
-"""Speed in m/s and rad/s below which a prop is at rest.
-
-The default threshold of Unity and PhysX, 0.005 J per kg, is the kinetic energy at ten times this
-speed.
-"""
-
-_SLEEP = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
-_WAKE = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
 
 
 class Rest(Protocol):
@@ -69,73 +54,6 @@ class Awake:
 
     def wake_around(self) -> None:
         """Do nothing."""
-
-
-class Sleep:
-    """Whether Bullet may leave a movable prop out of the simulation.
-
-    Args:
-        prop: The prop.
-        client: The PyBullet client.
-        steps: Agent steps at rest after which it sleeps.
-        woken: The props that were woken since the last physics step; it is added when it wakes.
-
-    Attributes:
-        is_allowed: Whether Bullet may leave it out, see above.
-    """
-
-    def __init__(self, prop: Prop, client: BulletClient, steps: int, woken: list[Prop]) -> None:
-        self._prop = prop
-        self._client = client
-        self._steps = steps
-        self._woken = woken
-        self._still_steps = 0
-        self.is_allowed = False
-        # Bullet compares the sum of the squares of all velocities
-        client.changeDynamics(prop.body_id, -1, sleepThreshold=REST_SPEED**2)
-
-    def wake(self) -> None:
-        """Let Bullet simulate the prop, from the second physics step on; the first does not."""
-        self._still_steps = 0
-        if self.is_allowed:
-            self.is_allowed = False
-            self._woken.append(self._prop)
-            self._set_state(self._prop.body_id, _WAKE)
-
-    def wake_around(self) -> None:
-        """Wake the prop, and what touched it in the last physics step."""
-        self.wake()
-        points = self._client.getContactPoints(self._prop.body_id)
-        for other in sorted({point.body_b for point in points}):
-            self._set_state(other, pybullet.ACTIVATION_STATE_WAKE_UP)
-
-    def count(self, still: bool) -> None:
-        """Count an agent step, and let the prop sleep when it has been at rest for long enough.
-
-        Args:
-            still: Whether the prop was at rest in it.
-        """
-        self._still_steps = self._still_steps + 1 if still else 0
-        self.fall_asleep()
-
-    def fall_asleep(self) -> None:
-        """Let the prop sleep if it has just been at rest for long enough."""
-        # and again later: a prop that touched it may have woken it since
-        if self._still_steps and self._still_steps % self._steps == 0:
-            self.is_allowed = True
-            self._set_state(self._prop.body_id, _SLEEP)
-
-    def resume(self, asleep: Collection[int]) -> None:
-        """Let the prop sleep if it slept when Bullet's state was saved, which was restored now.
-
-        Args:
-            asleep: PyBullet's ids of the bodies that slept.
-        """
-        if self._prop.body_id in asleep:
-            self._set_state(self._prop.body_id, _SLEEP)
-
-    def _set_state(self, body_id: int, state: int) -> None:
-        self._client.changeDynamics(body_id, -1, activationState=state)
 
 
 _LARGEST_M = 1e6  # no playground is as large; the limit of bodies, too
