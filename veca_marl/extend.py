@@ -79,7 +79,7 @@ _HOMES = {
     "AlgorithmCfg": "veca_marl.algos.algorithm",
     "ArraySpec": "veca_marl.sim.sense",
     "Body": "veca_marl.sim.body.base",
-    "BodyCfg": "veca_marl.sim.body.base",
+    "BodyCfg": "veca_marl.sim.body.body_cfg",
     "Call": "veca_marl.sim.sound",
     "ClockCfg": "veca_marl.sim.physics.clock",
     "DoorCfg": "veca_marl.sim.physics.rooms",
