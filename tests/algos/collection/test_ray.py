@@ -64,6 +64,7 @@ def cluster():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(HELPERS), *sys.path]))
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        patch.setenv("RAY_worker_niceness", "0")  # as in a run, see `actors`
         before = signal.getsignal(signal.SIGTERM)
         ray.init(
             "local",
@@ -140,7 +141,7 @@ def test_an_actor_killed_while_it_collects_is_named(start):
 @pytest.mark.usefixtures("cluster")
 @pytest.mark.parametrize("use", ["update_policy", "restart", "collect"])
 def test_an_actor_that_hangs_is_named_and_killed(start, use):
-    experience = start(answer_limit_s=30.0)
+    experience = start()
     experience.restart(0)
     experience._collector._limit = CollectCfg(answer_limit_s=2.0).limit  # not for its start
     processes = [pid for _, pid in experience._collector.where]

@@ -14,10 +14,10 @@ from typing import TypeAlias
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import compiled, inlined
 from veca_marl.sim.vision.rasterizer import Depths, Lens, Surfaces
 
 Plane: TypeAlias = tuple[float, float, float, float, float, float]
@@ -45,7 +45,7 @@ def _disc(count: int, power: float) -> Floats:
 BLOCKER_DISC, SAMPLE_DISC = _disc(_BLOCKERS, 1.5), _disc(_SAMPLES, 0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def sunlit_fractions(
     view: Floats,
     lens: Lens,
@@ -119,7 +119,7 @@ def tallest_nearby(shadow_map: Depths, sun_view: Floats, sun_lens: Lens) -> Dept
     return np.asarray(cv2.dilate(heights, np.ones((reach, reach), np.uint8)), np.float32)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _is_open(
     right: float, up: float, away: float, sun_view: Floats, lens: Lens, tallest: Depths
 ) -> bool:
@@ -135,7 +135,7 @@ def _is_open(
     return bool(tallest[row, column] <= height + _MARGIN_M)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _noise(i: int, j: int) -> float:
     """Return a number in [0, 1) of a pixel (Jimenez 2014, interleaved gradient noise)."""
     mixed = 0.06711056 * i + 0.00583715 * j
@@ -143,7 +143,7 @@ def _noise(i: int, j: int) -> float:
     return mixed - math.floor(mixed)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _fraction(
     plane: Plane,
     cosine: float,
@@ -182,7 +182,7 @@ def _fraction(
     return float(seen / samples.shape[0])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _gap(plane: Plane, x: float, y: float, lens: Lens, shadow_map: Depths) -> float:
     """Return by how much the map is nearer to the sun than the receiving plane beside a point."""
     right, up, away, slope_x, slope_y, _ = plane
@@ -195,7 +195,7 @@ def _gap(plane: Plane, x: float, y: float, lens: Lens, shadow_map: Depths) -> fl
     return float(expected - shadow_map[row, column])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _point(view: Floats, lens: Lens, depth: Depths, j: int, i: int) -> tuple[float, float, float]:
     """Return the point that a pixel shows, world frame."""
     x, y, t = lens.columns[i], lens.rows[j], depth[j, i]
@@ -206,7 +206,7 @@ def _point(view: Floats, lens: Lens, depth: Depths, j: int, i: int) -> tuple[flo
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _normal(
     view: Floats, lens: Lens, depth: Depths, surfaces: Surfaces, j: int, i: int
 ) -> tuple[float, float, float]:

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.poses import Floats
+from veca_marl.sim.kernels import compiled
 
 Indices = NDArray[np.int64]
 
@@ -129,7 +129,7 @@ def with_mesh(table: MeshTable, mesh: Mesh, first_row: int) -> MeshTable:
     return MeshTable(*columns)
 
 
-@njit(cache=True)
+@compiled
 def deform_meshes(meshes: MeshTable, positions: Floats, rotations: Floats) -> None:
     """Compute all vertices from their frames, then the normals and the bounding boxes.
 
@@ -143,7 +143,7 @@ def deform_meshes(meshes: MeshTable, positions: Floats, rotations: Floats) -> No
     _write_bounds(meshes)
 
 
-@njit(cache=True)
+@compiled
 def blend(
     frames: Indices,
     weights: Floats,
@@ -168,7 +168,7 @@ def blend(
         vertices[v, 0], vertices[v, 1], vertices[v, 2] = x, y, z
 
 
-@njit(cache=True)
+@compiled
 def _write_normals(triangles: Indices, vertices: Floats, normals: Floats) -> None:
     """Mean of the normals of the triangles at each vertex, weighted by their areas."""
     normals[:] = 0.0
@@ -189,7 +189,7 @@ def _write_normals(triangles: Indices, vertices: Floats, normals: Floats) -> Non
         normals[v, 0], normals[v, 1], normals[v, 2] = x * scale, y * scale, z * scale
 
 
-@njit(cache=True)
+@compiled
 def _write_bounds(meshes: MeshTable) -> None:
     """Axis-aligned bounding box of each mesh."""
     for m in range(meshes.lower.shape[0]):

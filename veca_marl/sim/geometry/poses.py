@@ -11,10 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from veca_marl.sim.kernels import kernel
+from veca_marl.sim.kernels import compiled, kernel
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +76,7 @@ def quaternions_to_matrices(quaternions: Floats, out: Floats) -> None:
         out[n, 2, 2] = 1.0 - (x * xs + y * ys)
 
 
-@njit(cache=True)
+@compiled
 def follow_poses(
     positions: Floats,
     rotations: Floats,

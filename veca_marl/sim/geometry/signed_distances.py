@@ -19,7 +19,7 @@ import math
 from typing import Any, TypeAlias
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import overload
 
 from veca_marl.sim.geometry.polyhedra import (
@@ -31,6 +31,7 @@ from veca_marl.sim.geometry.polyhedra import (
 )
 from veca_marl.sim.geometry.poses import Floats, Vector
 from veca_marl.sim.geometry.primitives import Primitive, Shape
+from veca_marl.sim.kernels import compiled, inlined
 
 DistanceAndGradient: TypeAlias = tuple[float, float, float, float]
 Solid: TypeAlias = tuple[int, Vector] | tuple[Floats, Vector]
@@ -42,7 +43,7 @@ _PARALLEL = 1e-12
 _OPTIONS: Any = {"error_model": "numpy", "forceinline": True}
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def distance(shape: int, size: Vector, x: float, y: float, z: float) -> float:
     """Return the signed distance alone, without its gradient; see `distance_and_gradient`.
 
@@ -65,7 +66,7 @@ def distance(shape: int, size: Vector, x: float, y: float, z: float) -> float:
     return math.sqrt(x * x + y * y + z * z) - float(size[0])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def is_inside(shape: int, size: Vector, x: float, y: float, z: float) -> bool:
     """Return whether a point lies inside a primitive: much cheaper than its distance."""
     if shape == _BOX:
@@ -77,7 +78,7 @@ def is_inside(shape: int, size: Vector, x: float, y: float, z: float) -> bool:
     return x * x + y * y + z * z < size[0] * size[0]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def distance_and_gradient(
     shape: int, size: Vector, x: float, y: float, z: float
 ) -> DistanceAndGradient:
@@ -100,14 +101,14 @@ def distance_and_gradient(
     return _from_sphere(size[0], x, y, z - min(max(z, -half), half))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _from_sphere(radius: float, x: float, y: float, z: float) -> DistanceAndGradient:
     length = math.sqrt(x * x + y * y + z * z)
     scale = 1.0 / max(length, _TINY_M)
     return length - radius, x * scale, y * scale, z * scale
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _from_box(half: Vector, x: float, y: float, z: float) -> DistanceAndGradient:
     a, b, c = abs(x) - half[0], abs(y) - half[1], abs(z) - half[2]
     sx, sy, sz = math.copysign(1.0, x), math.copysign(1.0, y), math.copysign(1.0, z)
@@ -123,7 +124,7 @@ def _from_box(half: Vector, x: float, y: float, z: float) -> DistanceAndGradient
     return length, sx * a * scale, sy * b * scale, sz * c * scale
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _from_cylinder(radius: float, half: float, x: float, y: float, z: float) -> DistanceAndGradient:
     across = math.sqrt(x * x + y * y)
     scale, sz = 1.0 / max(across, _TINY_M), math.copysign(1.0, z)
@@ -137,7 +138,7 @@ def _from_cylinder(radius: float, half: float, x: float, y: float, z: float) -> 
     return end, 0.0, 0.0, sz
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def entry_distance(shape: int, size: Vector, point: Vector, direction: Vector) -> float:
     """Return the distance from a point outside a primitive to where a ray enters it.
 
@@ -170,13 +171,13 @@ def entry_distance(shape: int, size: Vector, point: Vector, direction: Vector) -
     return min(side, low, _sphere_entry(size[0], x, y, z - half, u, v, w))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _first_common(near: float, far: float) -> float:
     """Return the start of an interval of the ray if it is not empty and not behind."""
     return near if near <= far and near >= 0.0 else NO_ENTRY_M
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _sphere_entry(
     radius: float, x: float, y: float, z: float, u: float, v: float, w: float
 ) -> float:
@@ -190,7 +191,7 @@ def _sphere_entry(
     return near if near >= 0.0 else NO_ENTRY_M
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _between_planes(half: float, x: float, u: float) -> tuple[float, float]:
     """Return the interval of the ray between the planes ``x = -half`` and ``x = half``."""
     if abs(u) < _PARALLEL:
@@ -199,7 +200,7 @@ def _between_planes(half: float, x: float, u: float) -> tuple[float, float]:
     return min(one, other), max(one, other)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _within_infinite_cylinder(
     radius: float, x: float, y: float, u: float, v: float
 ) -> tuple[float, float]:
@@ -296,7 +297,7 @@ overload(solid_entry, jit_options=_OPTIONS)(
 )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _write_distances(solid: Solid, points: Floats, out: Floats) -> None:
     for i in range(points.shape[0]):
         out[i] = solid_distance(solid, points[i, 0], points[i, 1], points[i, 2])

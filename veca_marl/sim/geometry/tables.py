@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.polyhedra import joined_rows, sizes_of
 from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.primitives import Primitive
+from veca_marl.sim.kernels import compiled
 
 Bools = NDArray[np.bool_]
 
@@ -165,7 +165,7 @@ def appended(table: GeomTable, more: GeomTable) -> GeomTable:
     return GeomTable(*columns)
 
 
-@njit(cache=True)
+@compiled
 def compose(
     frame_positions: Floats,
     frame_rotations: Floats,

@@ -12,11 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import kernel
+from veca_marl.sim.kernels import compiled, kernel
 from veca_marl.sim.sound.diffraction import add_measure, energy_past
 from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.screens import contains_point
@@ -48,7 +47,7 @@ class Reflector(NamedTuple):
     openings: Screens
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def energies_inside(
     source: Floats,
     head: Floats,
@@ -83,7 +82,7 @@ def energies_inside(
     return energies
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def energies_between(
     source: Floats,
     head: Floats,
@@ -145,7 +144,7 @@ def _most_silhouettes(n_first: int, n_later: int, lattice: Numbers) -> int:
     return n_first + most * n_later
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _not_round(numbers: Numbers, one: Floats, other: Floats, screens: Screens) -> Numbers:
     """Return the screens without those that contain one of two points.
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import compiled
 
 SPEED_OF_SOUND_MPS = 343.0
 """Dry air at 20 degrees Celsius (ISO 9613-1)."""
@@ -94,7 +94,7 @@ def image_lattice(order: int) -> NDArray[np.int64]:
     return lattice
 
 
-@njit(cache=True)
+@compiled
 def image_sources(
     source: Floats, lower: Floats, size: Floats, lattice: NDArray[np.int64]
 ) -> Floats:

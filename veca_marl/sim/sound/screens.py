@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import kernel
+from veca_marl.sim.kernels import compiled, kernel
 from veca_marl.sim.sound.silhouettes import BOX, CLOSED, LEAF, Screens
 
 Boxes = tuple[Floats, Floats, Floats]
@@ -222,7 +221,7 @@ def _openness(leaves: Boxes, closed: Boxes) -> Floats:
     return openness
 
 
-@njit(cache=True)
+@compiled
 def _rooms_of(
     centres: Floats, walls: NDArray[np.bool_], lower: Floats, upper: Floats
 ) -> NDArray[np.int64]:
@@ -241,7 +240,7 @@ def _rooms_of(
     return rooms
 
 
-@njit(cache=True)
+@compiled
 def _air(
     centres: Floats,
     rotations: Floats,
@@ -286,7 +285,7 @@ def _through_faces(centre: float, extent: float, lower: float, upper: float) -> 
     return below, above
 
 
-@njit(cache=True)
+@compiled
 def _bounds(
     centres: Floats,
     rotations: Floats,
@@ -355,7 +354,7 @@ def _before_doorways(
     return min(below, 1.0), min(above, 1.0)
 
 
-@njit(cache=True)
+@compiled
 def _joints(centres: Floats, rotations: Floats, halves: Floats, rooms: NDArray[np.int64]) -> Floats:
     """Return which faces of walls meet another wall, see `Screens.joints`."""
     joints = np.zeros((len(centres), 3, 2))

@@ -7,10 +7,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import compiled
 from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS
 from veca_marl.sim.sound.signal_paths import read_moving
 
@@ -54,7 +54,7 @@ def shelf_design(sample_rate_hz: float) -> ShelfDesign:
     return ShelfDesign(fit, crossovers)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def shelf_filters(energy: Floats, design: ShelfDesign) -> NDArray[np.float32]:
     """Return filters with given energies in the octave bands.
 
@@ -102,7 +102,7 @@ def unshaded(n_paths: int) -> NDArray[np.float32]:
     return sections
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def is_unity(sections: Sections) -> bool:
     """Return whether sections ``(S, 3)``, see `shelf_filters`, change nothing."""
     for s in range(sections.shape[0]):
@@ -111,7 +111,7 @@ def is_unity(sections: Sections) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def shade(
     signal: NDArray[np.float32], before: Sections, after: Sections, state: NDArray[np.float32]
 ) -> None:
@@ -128,7 +128,7 @@ def shade(
         _shade_three(signal, before[s : s + 3], per_sample[s : s + 3], state[s : s + 3])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _shade_three(
     signal: NDArray[np.float32], before: Sections, slope: Sections, state: NDArray[np.float32]
 ) -> None:
@@ -162,7 +162,7 @@ def _shade_three(
     state[0], state[1], state[2] = r, s, t
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def read_shaded_block(
     powers: NDArray[np.float32],
     start: int,
@@ -209,7 +209,7 @@ def read_shaded_block(
     ends[:] = signals[:, :, signals.shape[2] - ends.shape[2] :]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def settle(
     powers: NDArray[np.float32],
     start: int,

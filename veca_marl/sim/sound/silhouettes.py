@@ -9,11 +9,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import kernel
+from veca_marl.sim.kernels import compiled, kernel
 from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.room_acoustics import SPEED_OF_SOUND_MPS
 
@@ -140,7 +139,7 @@ class Work(NamedTuple):
     moving: NDArray[np.int64]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def make_work(most: int) -> Work:
     """Return arrays for paths with at most so many silhouettes."""
     return Work(

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
+from veca_marl.sim.kernels import compiled
 from veca_marl.sim.sound.partitions import N_BANDS
 from veca_marl.sim.sound.room_acoustics import Room, image_gains, image_lattice, image_sources
 
@@ -149,7 +149,7 @@ class OneRoom:
         return nearest
 
 
-@njit(cache=True)
+@compiled
 def _vectors_to_images(
     source: Floats,
     position: Floats,

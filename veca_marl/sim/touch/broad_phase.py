@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-from numba import njit
-
 from veca_marl.sim.geometry import (
     Bools,
     Floats,
@@ -20,6 +18,7 @@ from veca_marl.sim.geometry import (
     bounding_radius,
     distance,
 )
+from veca_marl.sim.kernels import compiled, inlined
 from veca_marl.sim.touch.taxels import TaxelTable
 
 _POLYHEDRON = int(Shape.POLYHEDRON)
@@ -28,7 +27,7 @@ _POLYHEDRON = int(Shape.POLYHEDRON)
 PlacedPrimitive: TypeAlias = tuple[int, Vector, Vector, Vector, Vector, Vector]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def bounding_spheres(taxels: TaxelTable, vertices: Floats, patches: Floats, bones: Floats) -> None:
     """Compute spheres that contain all sensing points, for any pose of the joints.
 
@@ -59,7 +58,7 @@ def bounding_spheres(taxels: TaxelTable, vertices: Floats, patches: Floats, bone
     _enclose(bones, 0, whole, bones, whole)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _enclose(spheres: Floats, first: int, end: int, out: Floats, row: int) -> None:
     """Write to a row a sphere that contains the spheres `first` to `end` - 1."""
     out[row] = 0.0
@@ -74,7 +73,7 @@ def _enclose(spheres: Floats, first: int, end: int, out: Floats, row: int) -> No
     out[row, 3] = radius
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def find_candidates(
     geoms: GeomTable,
     ignored: Bools,
@@ -115,7 +114,7 @@ def find_candidates(
                 candidates[bone, g] = away < bones[bone, 3] + margin
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def farthest_contact(thickness: float, skin: float, radius: float) -> float:
     """Return the greatest distance of a sensed point of a primitive from the sensing point.
 
@@ -130,7 +129,7 @@ def farthest_contact(thickness: float, skin: float, radius: float) -> float:
     return max(thickness + min(thickness, skin), skin) + radius
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _spheres_overlap(spheres: Floats, row: int, positions: Floats, g: int, reach: float) -> bool:
     """Return whether the bounding spheres of a bone and of a primitive overlap."""
     x, y = spheres[row, 0] - positions[g, 0], spheres[row, 1] - positions[g, 1]
@@ -138,7 +137,7 @@ def _spheres_overlap(spheres: Floats, row: int, positions: Floats, g: int, reach
     return bool(x * x + y * y + z * z < both * both)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def placed_primitive(geoms: GeomTable, g: int) -> PlacedPrimitive:
     """Return one row of the table as scalars, loaded once for all points compared with it."""
     r, p, s = geoms.rotations, geoms.positions, geoms.sizes
@@ -152,7 +151,7 @@ def placed_primitive(geoms: GeomTable, g: int) -> PlacedPrimitive:
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def to_local(primitive: PlacedPrimitive, points: Floats, row: int) -> Vector:
     """Return a row of world points in the axes of a primitive."""
     _, _, origin, along_x, along_y, along_z = primitive
@@ -164,7 +163,7 @@ def to_local(primitive: PlacedPrimitive, points: Floats, row: int) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def squared_length(x: float, y: float, z: float) -> float:
     """Return the squared length of a vector."""
     return x * x + y * y + z * z

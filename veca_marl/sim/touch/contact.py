@@ -13,8 +13,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
-
 from veca_marl.sim.geometry import (
     DistanceAndGradient,
     Floats,
@@ -25,6 +23,7 @@ from veca_marl.sim.geometry import (
     solid_entry,
     solid_gradient,
 )
+from veca_marl.sim.kernels import compiled, inlined
 from veca_marl.sim.touch.rigid_bones import distance_to_placed, moved_to_height, shrunk
 
 _BOX, _CYLINDER = int(Shape.BOX), int(Shape.CYLINDER)
@@ -44,7 +43,7 @@ class PressingSolid(NamedTuple):
     layer: float
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def core_and_layer(shape: int, size: Vector, skin: float, kept: float) -> tuple[Vector, float]:
     """Return the size of the core of a primitive, and the layer of skin around it.
 
@@ -59,20 +58,20 @@ def core_and_layer(shape: int, size: Vector, skin: float, kept: float) -> tuple[
     return shrunk(shape, size, skin - kept), 0.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def pressing_distance(pressing: PressingSolid, x: float, y: float, z: float) -> float:
     """Return the signed distance of a point, metres."""
     return solid_distance(pressing.core, x, y, z) - pressing.layer
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def pressing_gradient(pressing: PressingSolid, x: float, y: float, z: float) -> DistanceAndGradient:
     """Return the signed distance of a point and its gradient, see `distance_and_gradient`."""
     slope: DistanceAndGradient = solid_gradient(pressing.core, x, y, z)
     return slope[0] - pressing.layer, slope[1], slope[2], slope[3]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def pressing_entry(pressing: PressingSolid, point: Vector, way: Vector, reach: float) -> float:
     """Return the distance along a ray from outside to where it enters.
 
@@ -90,7 +89,7 @@ def pressing_entry(pressing: PressingSolid, point: Vector, way: Vector, reach: f
     return float(solid_entry(pressing.core, point, way))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _traced_entry(pressing: PressingSolid, point: Vector, way: Vector, reach: float) -> float:
     """Follow a ray by its distance from the solid (sphere tracing; Hart, Visual Computer 1996)."""
     (x, y, z), (u, v, w) = point, way
@@ -124,7 +123,7 @@ class Column(NamedTuple):
     bones: int
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def taxel_reading(
     column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, known: float
 ) -> float:
@@ -152,7 +151,7 @@ def taxel_reading(
     return known
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _reading_around(
     column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, away: float
 ) -> float:
@@ -177,14 +176,14 @@ def _reading_around(
     return reading
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _pressed_share(column: Column, placed: Floats, x: float, y: float, z: float) -> float:
     """Return how much of the true skin of the bone is displaced below a point, in [0, 1]."""
     height = distance_to_placed(placed, column.bones, x, y, z) + column.inset
     return min(max(1.0 - height / column.length, 0.0), 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _column_reading(
     column: Column, placed: Floats, base: Vector, normal: Vector, known: float
 ) -> float:
@@ -203,7 +202,7 @@ def _column_reading(
     return max(min(share, _pressed_share(column, placed, x, y, z)), known)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _field_reading(
     column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, known: float
 ) -> float:

@@ -36,7 +36,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from veca_marl.sim.geometry import (
     Bools,
@@ -46,6 +45,7 @@ from veca_marl.sim.geometry import (
     Vector,
     solid_of,
 )
+from veca_marl.sim.kernels import compiled, inlined
 from veca_marl.sim.touch.broad_phase import (
     PlacedPrimitive,
     bounding_spheres,
@@ -122,7 +122,7 @@ def read_taxels(
         measure_penetration(taxels, fields, vertices, geoms, geoms.faces, own, workspace, readings)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _read_all_but_polyhedra(
     taxels: TaxelTable,
     fields: Fields,
@@ -142,7 +142,7 @@ def _read_all_but_polyhedra(
     measure_penetration(taxels, fields, vertices, geoms, None, own, workspace, readings)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def measure_penetration(
     taxels: TaxelTable,
     fields: Fields,
@@ -195,7 +195,7 @@ def measure_penetration(
                 )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _sensed_primitive(geoms: GeomTable, g: int, kept: float) -> tuple[PlacedPrimitive, float]:
     """Return a row of the table as scalars, its core alone, and the layer of `PressingSolid`.
 
@@ -209,7 +209,7 @@ def _sensed_primitive(geoms: GeomTable, g: int, kept: float) -> tuple[PlacedPrim
     return (shape, core, origin, along_x, along_y, along_z), layer
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _read_patch(
     taxels: TaxelTable,
     patch: int,
@@ -244,13 +244,13 @@ def _read_patch(
             readings[t, n] = taxel_reading(column, placed, base, normal, radii[t], readings[t, n])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _row(points: Floats, row: int) -> Vector:
     """Return a row as three scalars."""
     return points[row, 0], points[row, 1], points[row, 2]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _is_outside(
     column: Column,
     a: Vector,
@@ -279,7 +279,7 @@ def _is_outside(
     return beyond > math.sqrt(0.25 * farthest + along * along) + radius
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _base(a: Vector, b: Vector, c: Vector, weights: Vector, normal: Vector, depth: float) -> Vector:
     """Return the point `depth` below a taxel on the mesh."""
     return (
@@ -289,7 +289,7 @@ def _base(a: Vector, b: Vector, c: Vector, weights: Vector, normal: Vector, dept
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _unit_normal(a: Vector, b: Vector, c: Vector) -> Vector:
     """Return the unit normal of a triangle, outward for counter-clockwise corners."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from veca_marl.sim.geometry import (
     DistanceAndGradient,
@@ -18,6 +17,7 @@ from veca_marl.sim.geometry import (
     distance,
     distance_and_gradient,
 )
+from veca_marl.sim.kernels import compiled, inlined
 
 _SPHERE, _BOX = int(Shape.SPHERE), int(Shape.BOX)
 _CYLINDER, _CAPSULE = int(Shape.CYLINDER), int(Shape.CAPSULE)
@@ -56,7 +56,7 @@ def rigid_bones(geoms: GeomTable, body: SceneObject, count: int) -> RigidBones:
     return RigidBones(rows[order], first, np.zeros((int(np.diff(first).max()), PLACED_COLUMNS)))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def shrunk(shape: int, size: Vector, by: float) -> Vector:
     """Return the size of a primitive with all of its surface moved inward, cf. `grown`.
 
@@ -71,7 +71,7 @@ def shrunk(shape: int, size: Vector, by: float) -> Vector:
     return size[0] - by, size[1], 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def place_bone(
     geoms: GeomTable, bones: RigidBones, bone: int, rotation: Floats, origin: Floats
 ) -> int:
@@ -104,7 +104,7 @@ def place_bone(
     return int(end - first)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def distance_to_placed(placed: Floats, count: int, x: float, y: float, z: float) -> float:
     """Return the signed distance of a point from the first `count` placed primitives."""
     nearest = _FAR_M
@@ -114,7 +114,7 @@ def distance_to_placed(placed: Floats, count: int, x: float, y: float, z: float)
     return nearest
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def is_farther(shape: int, size: Vector, placed: Floats, count: int, reach: float) -> bool:
     """Return whether a primitive is certainly farther than `reach` from the placed ones.
 
@@ -148,7 +148,7 @@ def is_farther(shape: int, size: Vector, placed: Floats, count: int, reach: floa
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def moved_to_height(placed: Floats, count: int, point: Vector, height: float) -> Vector:
     """Return a point moved along the gradient of the distance from a bone to a given distance.
 
@@ -174,7 +174,7 @@ def moved_to_height(placed: Floats, count: int, point: Vector, height: float) ->
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _local(placed: Floats, row: int, x: float, y: float, z: float) -> tuple[int, Vector, Vector]:
     """Return shape and size of a placed primitive, and a point in its own axes."""
     q = placed[row]

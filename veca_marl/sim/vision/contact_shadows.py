@@ -13,7 +13,6 @@ import math
 from typing import Any, TypeAlias
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import (
@@ -27,6 +26,7 @@ from veca_marl.sim.geometry import (
     single,
 )
 from veca_marl.sim.geometry.polyhedra import limited_distance
+from veca_marl.sim.kernels import compiled, inlined
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
@@ -50,7 +50,7 @@ _SPHERE, _BOX, _CYLINDER = int(Shape.SPHERE), int(Shape.BOX), int(Shape.CYLINDER
 _CAPSULE, _POLYHEDRON = int(Shape.CAPSULE), int(Shape.POLYHEDRON)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def darken_contact_shadows(
     geoms: GeomTable,
     casting: Bools,
@@ -89,7 +89,7 @@ def darken_contact_shadows(
             lights[j, i] *= single(1.0 - DARKNESS * nearness[j, i] * nearness[j, i])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) -> Rectangle:
     """Return the pixels that may show a square of the floor below a point."""
     ex, ey, ez = position[0] - view[0, 0], position[1] - view[0, 1], -view[0, 2]
@@ -106,7 +106,7 @@ def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) 
     return pixel_rectangle(across, upward, lens)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _approach(
     geoms: GeomTable,
     g: int,
@@ -142,13 +142,13 @@ def _approach(
             _approach_row(_CAPSULE, size, frame, eye, lens.rows[j], g, pixels)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _vector(array: NDArray[Any]) -> Vector:
     """Return three numbers of an array as scalars, which the compiler knows loops do not change."""
     return array[0], array[1], array[2]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _visible_point(eye: Ray, x: float, y: float, depth: float) -> Vector:
     """Return the point that a pixel shows, world frame; x and y are the slopes of its ray."""
     position, right, up, forward = eye
@@ -159,7 +159,7 @@ def _visible_point(eye: Ray, x: float, y: float, depth: float) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _in_frame(frame: Ray, point: Vector) -> Vector:
     """Return a point in the frame of a primitive: its position and its three axes."""
     origin, ahead, left, upward = frame
@@ -171,7 +171,7 @@ def _in_frame(frame: Ray, point: Vector) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _approach_row_of_faces(
     faces: Floats, size: Vector, frame: Ray, eye: Ray, y: float, name: int, pixels: Pixels
 ) -> None:
@@ -189,7 +189,7 @@ def _approach_row_of_faces(
         nearness[i] = max(nearness[i], near)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _approach_row(
     shape: int,
     size: Vector,

@@ -16,10 +16,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, Indices, MeshTable, Vector, single
+from veca_marl.sim.kernels import compiled, inlined
 from veca_marl.sim.vision.rasterizer import (
     Depths,
     Interval,
@@ -36,7 +36,7 @@ _MARGIN_PX = 0.01  # covers rounding errors of slopes in single precision
 _ROUNDING_M = 1e-4  # depths are stored in single precision
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def to_camera_frame(vertices: Floats, view: Floats, seen: Floats) -> None:
     """Write vertices ``(V, 3)`` in the camera frame: metres right, up and forward.
 
@@ -53,7 +53,7 @@ def to_camera_frame(vertices: Floats, view: Floats, seen: Floats) -> None:
             seen[v, axis] = view[axis + 1, 0] * x + view[axis + 1, 1] * y + view[axis + 1, 2] * z
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def draw_triangles(
     triangles: Indices,
     seen: Floats,
@@ -93,12 +93,12 @@ def draw_triangles(
             _fill(edges, volume, rectangle, lens, name, depth, surfaces)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _at(seen: Floats, vertex: int) -> Vector:
     return seen[vertex, 0], seen[vertex, 1], seen[vertex, 2]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _cross(a: Vector, b: Vector) -> Vector:
     return (
         a[1] * b[2] - a[2] * b[1],
@@ -107,7 +107,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> Rectangle:
     """Return the pixels that a triangle may cover."""
     if nearest <= lens.near:
@@ -119,7 +119,7 @@ def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> R
     return _centres_between(across, upward, lens)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _centres_between(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
     """Return the pixels with centres between two pairs of slopes.
 
@@ -141,7 +141,7 @@ def _centres_between(across: Interval, upward: Interval, lens: Lens) -> Rectangl
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _cut_rectangle(a: Vector, b: Vector, c: Vector, lens: Lens) -> Rectangle:
     """Return the pixels that a triangle crossing the near plane may cover, most often none.
 
@@ -165,7 +165,7 @@ def _cut_rectangle(a: Vector, b: Vector, c: Vector, lens: Lens) -> Rectangle:
     return _centres_between((low_x, high_x), (low_y, high_y), lens)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _fill(
     edges: tuple[Vector, Vector, Vector],
     volume: float,
@@ -192,7 +192,7 @@ def _fill(
                 surfaces[j, i] = name
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def illuminate_triangles(
     meshes: MeshTable,
     seen: Floats,
@@ -221,7 +221,7 @@ def illuminate_triangles(
                 lights[j, i] = _light(meshes, seen, t, lens.columns[i], lens.rows[j])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _light(meshes: MeshTable, seen: Floats, t: int, x: float, y: float) -> float:
     """Return the brightness of a triangle where the ray of slopes (x, y) hits it."""
     i, j, k = meshes.triangles[t, 0], meshes.triangles[t, 1], meshes.triangles[t, 2]
@@ -238,13 +238,13 @@ def _light(meshes: MeshTable, seen: Floats, t: int, x: float, y: float) -> float
     return single(AMBIENT + (1.0 - AMBIENT) * max(facing, 0.0) + BOUNCE * max(-facing, 0.0))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _edge(a: Vector, b: Vector, x: float, y: float) -> float:
     normal = _cross(a, b)
     return normal[0] * x + normal[1] * y + normal[2]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def draw_meshes(
     meshes: MeshTable,
     drawn: Bools,
@@ -280,7 +280,7 @@ def draw_meshes(
         draw_triangles(triangles, seen, chosen, lens, first_surface + begin, depth, surfaces)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def is_occluded(lower: Floats, upper: Floats, view: Floats, lens: Lens, depth: Depths) -> bool:
     """Return whether a box is entirely hidden or outside of the image.
 

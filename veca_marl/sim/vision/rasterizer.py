@@ -20,10 +20,10 @@ import math
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape, Vector, bounding_radius, single
+from veca_marl.sim.kernels import compiled
 from veca_marl.sim.vision.row_intersections import (
     box_row,
     capsule_row,
@@ -52,7 +52,7 @@ _POLYHEDRON = int(Shape.POLYHEDRON)
 _HALF = single(0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def disc_interval(across: float, forward: float, radius: float, limit: float) -> Interval:
     """Return the slopes of the two tangents from the camera to a disc, cut to [-limit, limit].
 
@@ -77,7 +77,7 @@ def disc_interval(across: float, forward: float, radius: float, limit: float) ->
     return (edge, limit) if across > 0.0 else (-limit, -edge)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _forward_tangent(across: float, forward: float, radius: float) -> float:
     """Return the slope of the tangent to a disc beside the camera, on the optical axis' side."""
     angle = math.atan2(across, forward)
@@ -85,7 +85,7 @@ def _forward_tangent(across: float, forward: float, radius: float) -> float:
     return math.tan(angle) if angle < _GRAZING_RAD else math.inf
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def rod_interval(
     across: float,
     forward: float,
@@ -109,7 +109,7 @@ def rod_interval(
     return min(low, other_low), max(high, other_high)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def box_intervals(
     centre: Vector, half: Vector, right: Vector, up: Vector, forward: Vector, near: float
 ) -> tuple[Interval, Interval]:
@@ -160,7 +160,7 @@ def box_intervals(
     return (low_x, high_x), (low_y, high_y)
 
 
-@njit(cache=True)
+@compiled
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -185,7 +185,7 @@ class Lens(NamedTuple):
     far: float
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def draw_geoms(
     geoms: GeomTable,
     drawn: Bools,
@@ -227,7 +227,7 @@ def draw_geoms(
             )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
     """Return camera position and right, up and forward axes in a primitive's own axes."""
     return (
@@ -240,7 +240,7 @@ def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
     """Return a world vector in local axes, in single precision."""
     return (
@@ -250,7 +250,7 @@ def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def bounding_rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> Rectangle:
     """Return pixels (first column, last + 1, first row, last + 1) that a primitive may cover."""
     eye, right, up, forward = ray
@@ -281,7 +281,7 @@ def bounding_rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Le
     return pixel_rectangle(across, upward, lens)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
     """Return the pixels with centres between two pairs of slopes; empty outside of the image."""
     left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
@@ -299,7 +299,7 @@ def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def draw_rectangle(
     shape: int,
     size: NDArray[np.float32],
@@ -336,7 +336,7 @@ def draw_rectangle(
             capsule_row(size[0], half_length, eye, start, right, columns, near, surface, row, names)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def draw_polyhedron(
     faces: Floats,
     first_face: int,

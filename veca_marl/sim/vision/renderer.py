@@ -12,10 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, MeshTable, Shape, SurfaceTable
+from veca_marl.sim.kernels import compiled
 from veca_marl.sim.vision.contact_shadows import darken_contact_shadows
 from veca_marl.sim.vision.mesh_rasterizer import draw_meshes, illuminate_triangles
 from veca_marl.sim.vision.rasterizer import (
@@ -54,7 +54,7 @@ class Layers(NamedTuple):
     surfaces: NDArray[np.int16]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def collect_layers(
     geoms: GeomTable, drawn: Bools, view: Floats, lens: Lens, depth: Depths
 ) -> Layers:
@@ -96,7 +96,7 @@ def collect_layers(
     return Layers(depths, surfaces)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _layers(count: int, size: tuple[int, int]) -> tuple[Depths, Surfaces]:
     """Return the depths and surfaces of empty layers."""
     return (
@@ -105,7 +105,7 @@ def _layers(count: int, size: tuple[int, int]) -> tuple[Depths, Surfaces]:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _insert(
     depths: Depths, surfaces: Surfaces, j: int, i: int, surface: np.int16, t: np.float32
 ) -> tuple[np.int16, np.float32]:
@@ -123,7 +123,7 @@ def _insert(
     return surface, t
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def blend_layers(
     geoms: GeomTable, colours: Depths, layers: Layers, view: Floats, lens: Lens, planes: Images
 ) -> None:
@@ -184,7 +184,7 @@ class DrawMasks(NamedTuple):
     triangles: Bools
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def render_views(
     geoms: GeomTable,
     meshes: MeshTable,
@@ -232,7 +232,7 @@ def render_views(
     return all_glass
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def with_glass(
     all_glass: NDArray[np.int16], v: int, objects: Surfaces, layers: NDArray[np.int16]
 ) -> NDArray[np.int16]:

@@ -18,11 +18,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.polyhedra import PLANES_COLUMN
 from veca_marl.sim.geometry.poses import Floats, Vector, single
+from veca_marl.sim.kernels import compiled
 
 Depths = NDArray[np.float32]
 Surfaces = NDArray[np.int16]
@@ -37,7 +37,7 @@ _PARALLEL = 1e-12
 _FAR_M = 1e9
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def sphere_row(
     radius: float,
     eye: Vector,
@@ -70,7 +70,7 @@ def sphere_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def box_row(
     half: Vector,
     eye: Vector,
@@ -100,7 +100,7 @@ def box_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def cylinder_row(
     radius: float,
     half_length: float,
@@ -134,7 +134,7 @@ def cylinder_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def capsule_row(
     radius: float,
     half_length: float,
@@ -176,7 +176,7 @@ def capsule_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def heights_above(faces: Floats, first: int, eye: Vector) -> Floats:
     """Return the distances ``(P,)`` of a point from the planes of a polyhedron, see `face_rows`."""
     (ox, oy, oz), count = eye, int(faces[first, _PLANES])
@@ -187,7 +187,7 @@ def heights_above(faces: Floats, first: int, eye: Vector) -> Floats:
     return heights
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def polyhedron_row(
     faces: Floats,
     first: int,

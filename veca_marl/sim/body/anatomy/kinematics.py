@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy.skeleton import Skeleton
 from veca_marl.sim.geometry import Floats, Primitive, Shape
-from veca_marl.sim.kernels import kernel
+from veca_marl.sim.kernels import compiled, inlined, kernel
 
 
 @kernel
@@ -81,7 +80,7 @@ def forward_kinematics(
     )
 
 
-@njit(cache=True)
+@compiled
 def _propagate(
     parents: NDArray[np.int64],
     rest_rotations: Floats,
@@ -117,7 +116,7 @@ def _propagate(
         velocities[bone, 2] = velocities[parent, 2] + u * y - v * x
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _product(a: Floats, b: Floats, i: int, j: int, row: int, column: int) -> float:
     """One element of a product of two matrices; numpy takes ten times as long for small ones."""
     return float(

@@ -22,10 +22,10 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Scene
+from veca_marl.sim.kernels import compiled
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.bullet_client import BulletClient, ContactPoint
 
@@ -179,7 +179,7 @@ class _Backing(NamedTuple):
     depth_m: float
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def near_circles(
     positions: Floats,
     rows: NDArray[np.int64],

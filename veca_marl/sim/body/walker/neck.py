@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Skeleton
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import compiled
 
 _ROUNDING_RAD = 1e-9
 
@@ -74,7 +74,7 @@ class Neck:
         _distribute(angles, bends, self._pairs, self._low, self._high)
 
 
-@njit(cache=True)
+@compiled
 def _distribute(
     angles: Floats,
     bends: tuple[float, float, float],

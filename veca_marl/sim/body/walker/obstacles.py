@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Scene, follow_poses, horizontal_distance
+from veca_marl.sim.kernels import compiled
 from veca_marl.sim.physics import Prop
 from veca_marl.sim.physics.bullet_client import BulletClient
 from veca_marl.sim.physics.props.geoms import swept_radius_m
@@ -99,7 +99,7 @@ class ObstacleBoxes:
         return low, high
 
 
-@njit(cache=True)
+@compiled
 def near_boxes(
     low: Floats, high: Floats, beyond_m: Floats, position: Floats, reach_m: float
 ) -> NDArray[np.int64]:

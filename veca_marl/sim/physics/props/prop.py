@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import (
@@ -18,6 +17,7 @@ from veca_marl.sim.geometry import (
     quaternions_to_matrices,
     rotation_about_vertical,
 )
+from veca_marl.sim.kernels import compiled
 from veca_marl.sim.physics.bullet import are_in_contact
 from veca_marl.sim.physics.bullet_client import BulletClient, Quaternion, Vector
 from veca_marl.sim.physics.props.geoms import (
@@ -407,7 +407,7 @@ def _copy_poses(props: Sequence[Prop], poses: Sequence[tuple[Vector, Quaternion]
     return []
 
 
-@njit(cache=True)
+@compiled
 def _write_poses(
     poses: Floats, rows: NDArray[np.int64], positions: Floats, rotations: Floats
 ) -> NDArray[np.bool_]:
