@@ -203,6 +203,23 @@ def test_a_policy_that_is_too_large_is_not_written(run, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_critics_that_do_not_fit_are_left_out_and_learning_starts_with_the_actor(
+    run, stored, tmp_path, monkeypatch
+):
+    largest = stored.stat().st_size - 200  # the text of other episodes has other digits
+    with monkeypatch.context() as patch:
+        patch.setattr("veca_marl.algos.policy_files.LARGEST_BYTES", largest)
+        small = add(AddOptions(str(run), "Small", str(tmp_path), episodes=1))
+    monkeypatch.setattr(policy_paths, "_POLICIES", tmp_path)
+    assert "algorithm" not in read_policy(small)["state"]
+    for team, spec in team_specs(load("Small").make()).items():
+        whole, actor = load_learnt(stored, team, spec), load_learnt(small, team, spec)
+        for expected, parameter in zip(
+            whole.actor.parameters(), actor.actor.parameters(), strict=True
+        ):
+            assert torch.equal(expected, parameter)
+
+
 def test_an_entry_that_exists_is_kept(run, stored, tmp_path):
     before = stored.read_bytes()
     with pytest.raises(ConfigError, match=naming("Tiny")):

@@ -29,25 +29,39 @@ _SEPARATOR = "/"
 def write_policy(path: Path, content: Mapping[str, Any], about: Mapping[str, Any]) -> None:
     """Write a policy.
 
+    Where critics do not fit into `LARGEST_BYTES`, they are left out: `init_from` begins with new
+    ones then.
+
     Args:
         path: The file.
         content: What `read_checkpoint` returned; of its state only actors and networks are stored.
         about: Plain data: `config` and `bodies` of the run, and what else is to be known.
 
     Raises:
-        CheckpointError: If it is larger than an entry may be.
+        CheckpointError: If the actors alone are larger than an entry may be.
         WriteError: If it cannot be written.
     """
     state = content["state"]
-    kept = {
-        "actors": state["actors"],
-        "algorithm": {
-            team: {"network": one["network"]}
-            for team, one in state["algorithm"].items()
-            if "network" in one
-        },
+    networks = {
+        team: {"network": one["network"]}
+        for team, one in state["algorithm"].items()
+        if "network" in one
     }
-    tensors, names = _flat(kept)
+    data = _packed(content, networks, about)
+    if len(data) > LARGEST_BYTES:
+        data = _packed(content, {}, about)
+    if len(data) > LARGEST_BYTES:
+        raise CheckpointError(
+            f"{path} would have {len(data)} bytes; a policy has at most {LARGEST_BYTES}"
+        )
+    write_atomically(path, data)
+
+
+def _packed(
+    content: Mapping[str, Any], networks: Mapping[str, Any], about: Mapping[str, Any]
+) -> bytes:
+    """Return the bytes of a file with the actors, and with some networks of the algorithms."""
+    tensors, names = _flat({"actors": content["state"]["actors"], "algorithm": networks})
     plain = {
         "format": FORMAT,
         KEY: content[KEY],
@@ -58,12 +72,7 @@ def write_policy(path: Path, content: Mapping[str, Any], about: Mapping[str, Any
         "sha256": _digest(tensors),
         "about": dict(about),
     }
-    data = save(tensors, {_TEXT: json.dumps(plain)})
-    if len(data) > LARGEST_BYTES:
-        raise CheckpointError(
-            f"{path} would have {len(data)} bytes; a policy has at most {LARGEST_BYTES}"
-        )
-    write_atomically(path, data)
+    return save(tensors, {_TEXT: json.dumps(plain)})
 
 
 def read_policy(path: Path) -> dict[str, Any]:

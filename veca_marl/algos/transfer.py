@@ -62,8 +62,12 @@ def load_learnt(path: Path, team: str, spec: TeamSpec) -> Algorithm:
         CheckpointError: See `load_actor`.
     """
     algorithm, stored = _make(path, team, spec)
-    with load_errors(path):
-        algorithm.load_learnt(_Checked(stored.state["algorithm"][team], stored.check))
+    learnt = stored.state.get("algorithm", {}).get(team)
+    if learnt is None:  # the file of a policy without its critics
+        _load_actor(path, algorithm, stored, team)
+    else:
+        with load_errors(path):
+            algorithm.load_learnt(_Checked(learnt, stored.check))
     return algorithm
 
 
