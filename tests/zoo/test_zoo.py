@@ -15,7 +15,7 @@ from stored_runs import train_tiny
 import veca_marl
 from veca_marl import policy_paths
 from veca_marl.algos.checkpoints import CheckpointError, checkpoints_in, read_checkpoint
-from veca_marl.algos.policy_files import LARGEST_BYTES, read_policy
+from veca_marl.algos.policy_files import LARGEST_BYTES, read_policy, write_policy
 from veca_marl.algos.specs import team_specs
 from veca_marl.algos.transfer import load_actor, load_learnt
 from veca_marl.config import ConfigError, compose
@@ -218,6 +218,20 @@ def test_critics_that_do_not_fit_are_left_out_and_learning_starts_with_the_actor
             whole.actor.parameters(), actor.actor.parameters(), strict=True
         ):
             assert torch.equal(expected, parameter)
+
+
+@pytest.mark.usefixtures("zoo")
+def test_learning_starts_with_the_actor_of_an_algorithm_without_other_networks(
+    run, stored, tmp_path
+):
+    """Behaviour cloning has none."""
+    content = read_checkpoint(checkpoints_in(run / "checkpoints")[-1], torch.device("cpu"))
+    state = {**content["state"], "algorithm": {team: {} for team in content["state"]["actors"]}}
+    cloned = tmp_path / "Cloned.safetensors"
+    write_policy(cloned, {**content, "state": state}, {"bodies": {}})
+    for team, spec in team_specs(load("Tiny").make()).items():
+        whole, actor = (load_learnt(path, team, spec) for path in (stored, cloned))
+        assert all(map(torch.equal, whole.actor.parameters(), actor.actor.parameters()))
 
 
 def test_an_entry_that_exists_is_kept(run, stored, tmp_path):

@@ -63,7 +63,7 @@ def load_learnt(path: Path, team: str, spec: TeamSpec) -> Algorithm:
     """
     algorithm, stored = _make(path, team, spec)
     learnt = stored.state.get("algorithm", {}).get(team)
-    if learnt is None:  # the file of a policy without its critics
+    if learnt is None:  # the file of a policy may hold its actor alone
         _load_actor(path, algorithm, stored, team)
     else:
         with load_errors(path):

@@ -1,4 +1,4 @@
-"""Decorators of the functions that numba compiles: the options are those of the whole package."""
+"""Decorators for functions that numba compiles; all have the same options."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numba import njit
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-# what is passed to `njit`, whose type stubs omit some of it
+# arguments of `njit`; some of them are missing in its type stubs
 _OPTIONS: dict[str, Any] = {
     "cache": True,
     "error_model": "numpy",  # divisions by zero give infinite numbers; loops can be vectorised
@@ -20,15 +20,15 @@ _OPTIONS: dict[str, Any] = {
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function that may create arrays, a decorator; where none is, use `kernel`."""
+    """Compile a function, a decorator. Where it creates no array, `kernel` is faster."""
     made: Function = njit(**_OPTIONS)(function)
     return made
 
 
 def inlined(function: Function) -> Function:
-    """Insert the body of a small function into those that call it, a decorator.
+    """Compile a small function into the functions that call it, a decorator.
 
-    It may be called by functions that are compiled by `compiled` or `kernel`.
+    These may be decorated by `compiled` or by `kernel`.
     """
     made: Function = njit(**_OPTIONS, inline="always")(function)
     return made

@@ -99,7 +99,7 @@ def _distribute(
 
 
 def _bends(rotation: Floats) -> tuple[float, float, float]:
-    """Return flexion, lateral bend and turn (rad) whose rotations one after the other give it."""
+    """Return the angles a, b, c (rad) of a rotation Ry(a) Rx(-b) Rz(c): flexion, lateral, turn."""
     return (
         math.atan2(rotation[0, 2], rotation[2, 2]),
         math.asin(min(max(rotation[1, 2], -1.0), 1.0)),
