@@ -1,17 +1,20 @@
-"""Compiled kernels are cached outside the package, in a folder that belongs to its sources."""
+"""Compiled kernels are cached outside the package, in folders that belong to their sources."""
 
+import ast
 import os
 import shutil
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
-import numba
 import pytest
 
-from veca_marl.sim import kernel_cache
-from veca_marl.sim.kernel_cache import KEPT_FOLDERS, configure_kernel_cache, source_digest
+import veca_marl
+from veca_marl.sim import kernel_cache, kernel_sources
+from veca_marl.sim.kernel_cache import KEPT_FOLDERS
+from veca_marl.sim.kernel_sources import KernelSources
 
 SOURCES = {
     "__init__.py": (
@@ -37,14 +40,16 @@ class TinyPackage:
     def __init__(self, root):
         self.root, self.folder, self.cache = root, root / "installed" / "tiny", root / "cache"
         self.folder.mkdir(parents=True)
-        shutil.copy(kernel_cache.__file__, self.folder)
+        for module in (kernel_cache, kernel_sources):
+            text = Path(module.__file__).read_text().replace("veca_marl.sim.", "tiny.")
+            (self.folder / Path(module.__file__).name).write_text(text)
         self.write("__init__.py")
         self.write("caller.py")
         self.write("called.py", value=1)
 
-    def write(self, name, **values):
+    def write(self, name, text=None, **values):
         self.folder.chmod(0o755)
-        (self.folder / name).write_text(SOURCES[name].format(**values))
+        (self.folder / name).write_text(text or SOURCES[name].format(**values))
         self.folder.chmod(0o555)
 
     def words(self, before=""):
@@ -97,6 +102,20 @@ def test_an_edit_of_a_called_function_in_another_file_is_noticed(tiny):
 
 
 @pytest.mark.slow
+def test_an_edit_of_what_a_kernel_does_not_import_leaves_it_valid(tiny):
+    assert tiny.call() == (1, 0, 1)
+    tiny.write("other.py", text="from tiny.caller import caller\n")
+    assert tiny.call() == (1, 1, 0)
+
+
+@pytest.mark.slow
+def test_a_copy_of_the_package_with_the_same_sources_needs_no_compilation(tiny):
+    assert tiny.call() == (1, 0, 1)
+    shutil.copytree(tiny.folder, tiny.root / "copy" / "tiny")
+    assert tiny.call(PYTHONPATH=str(tiny.root / "copy")) == (1, 1, 0)
+
+
+@pytest.mark.slow
 def test_processes_that_start_at_the_same_time_share_the_folder(tiny):
     with ThreadPoolExecutor() as pool:
         values = [value for value, *_ in pool.map(lambda _: tiny.call(), range(2))]
@@ -104,10 +123,13 @@ def test_processes_that_start_at_the_same_time_share_the_folder(tiny):
     assert tiny.call() == (1, 1, 0)
 
 
-def test_a_directory_that_the_user_has_chosen_is_used_as_it_is(tiny, tmp_path):
-    assert tiny.call(NUMBA_CACHE_DIR=str(tmp_path / "chosen")) == (1, 0, 1)
+def test_a_directory_that_the_user_has_chosen_is_used(tiny, tmp_path):
+    chosen = {"NUMBA_CACHE_DIR": str(tmp_path / "chosen")}
+    assert tiny.call(**chosen) == (1, 0, 1)
     assert list((tmp_path / "chosen").rglob("caller.caller*.nbc"))
     assert not tiny.cache.exists()
+    tiny.write("called.py", value=2)
+    assert tiny.call(**chosen) == (2, 0, 1)
 
 
 def test_without_a_writable_cache_directory_a_temporary_one_is_used_and_named(tiny):
@@ -117,46 +139,93 @@ def test_without_a_writable_cache_directory_a_temporary_one_is_used_and_named(ti
     assert "NUMBA_CACHE_DIR" in tiny.messages
 
 
-def test_only_the_folders_used_last_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    parent = tmp_path / "veca_marl" / "kernels"
-    caches = [f"{age:016x}" for age in range(2 * KEPT_FOLDERS)]
-    for age, name in enumerate(caches):
+def caches(tiny):
+    return {path.name for path in (tiny.cache / "veca_marl" / "kernels").iterdir()}
+
+
+def test_of_each_file_only_the_folders_used_last_are_kept(tiny):
+    parent = tiny.cache / "veca_marl" / "kernels"
+    old = [f"tiny.caller-{age:016x}" for age in range(2 * KEPT_FOLDERS)]
+    others = [f"tiny.other-{age:016x}" for age in range(2 * KEPT_FOLDERS)]
+    for age, name in enumerate(old + others):
         (parent / name).mkdir(parents=True)
         os.utime(parent / name, (1e9 - age, 1e9 - age))
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    configure_kernel_cache(tmp_path)
-    kept = {folder.name for folder in parent.iterdir()}
-    assert kept == {source_digest(tmp_path), *caches[: KEPT_FOLDERS - 1]}
+    tiny.call()
+    used = {name for name in caches(tiny) - {*old, *others} if name.startswith("tiny.caller")}
+    assert len(used) == 1
+    assert caches(tiny) >= {*old[: KEPT_FOLDERS - 1], *others}
+    assert not caches(tiny) & set(old[KEPT_FOLDERS - 1 :])
 
 
-def test_what_is_no_cache_is_never_deleted(tmp_path, monkeypatch):
+def test_what_is_no_cache_is_never_deleted(tiny):
     """Folders and files of other names, and links with the name of a cache."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    parent, foreign = tmp_path / "veca_marl" / "kernels", tmp_path / "thesis"
+    parent, foreign = tiny.cache / "veca_marl" / "kernels", tiny.root / "thesis"
     parent.mkdir(parents=True)
-    for folder in (foreign, *(parent / f"photos {n}" for n in range(2 * KEPT_FOLDERS))):
+    for folder in (foreign, *(parent / f"tiny.caller-photos {n}" for n in range(2 * KEPT_FOLDERS))):
         folder.mkdir()
         (folder / "kept.txt").touch()
         os.utime(folder, (1e9, 1e9))
     for number in range(2 * KEPT_FOLDERS):
-        (parent / f"{number:016x}").symlink_to(foreign)
-        (parent / f"{number + 100:016x}").touch()
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    before = {path.name for path in parent.iterdir()}
-    configure_kernel_cache(tmp_path)
-    assert {path.name for path in parent.iterdir()} == before | {source_digest(tmp_path)}
-    assert len(list(tmp_path.rglob("kept.txt"))) == 2 * KEPT_FOLDERS + 1
+        (parent / f"tiny.caller-{number:016x}").symlink_to(foreign)
+        (parent / f"tiny.caller-{number + 100:016x}").touch()
+    before = caches(tiny)
+    tiny.call()
+    assert caches(tiny) > before
+    assert len(list(tiny.root.rglob("kept.txt"))) == 2 * KEPT_FOLDERS + 1
 
 
-def test_the_digest_depends_on_names_and_contents(tmp_path):
-    digests = {source_digest(tmp_path)}
-    for name, text in [("a.py", "x"), ("b.py", ""), ("a.py", "xx"), ("b.py", "y")]:
-        (tmp_path / name).write_text(text)
-        digests.add(source_digest(tmp_path))
-    assert len(digests) == 5
-    (tmp_path / "notes.txt").touch()
-    assert source_digest(tmp_path) in digests
+def test_the_digest_depends_on_the_names_and_contents_of_what_is_imported(tmp_path):
+    package, texts = tmp_path / "tiny", {"a.py": "from tiny import b, c", "b.py": "x", "c.py": "y"}
+
+    def digest(**changes):
+        shutil.rmtree(package, ignore_errors=True)
+        package.mkdir()
+        for name, text in (texts | {f"{name}.py": text for name, text in changes.items()}).items():
+            (package / name).write_text(text)
+        sources = KernelSources(package)
+        return sources.digest(package / "a.py"), sources.digest_of_all()
+
+    first = digest()
+    changed = [
+        digest(a="from tiny import b, c\n"),
+        digest(a="import tiny.b"),
+        digest(b="xx"),
+        digest(b="import tiny.c"),
+        digest(c="z"),
+    ]
+    assert len({first[0], *(one for one, _ in changed)}) == 1 + len(changed)
+    assert digest(d="unused")[0] == first[0]
+    assert digest(d="unused")[1] != first[1]
+
+
+def test_imports_are_those_that_the_parser_finds():
+    """In every file of the package; a name that is imported may be a module itself."""
+    package = Path(veca_marl.__file__).parent
+    sources = KernelSources(package)
+    files = {sources.module(file): file for file in package.rglob("*.py")}
+    files |= {name.removesuffix(".__init__"): file for name, file in files.items()}
+    for file in package.rglob("*.py"):
+        found = sources.imports(file)
+        assert set(filter(None, map(files.get, imported(file)))) <= found, file
+        assert found <= set(files.values())
+
+
+def imported(file):
+    """Yield the modules that a file imports and the names that it imports from them."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            assert not node.level, "an import by a relative name"
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def test_kernels_do_not_depend_on_most_of_the_simulator():
+    """A change of a body leaves the kernels of the eyes and of sound valid."""
+    package = Path(veca_marl.__file__).parent
+    for file in ("vision/renderer.py", "sound/attenuated_paths.py", "touch/contact.py"):
+        reached = KernelSources(package).closure(package / "sim" / file)
+        assert not any("/body/walker/" in path.as_posix() for path in reached)
 
 
 def entries(tiny, kind):

@@ -4,4 +4,4 @@ from pathlib import Path
 
 from veca_marl.sim.kernel_cache import configure_kernel_cache
 
-configure_kernel_cache(Path(__file__).parent)
+configure_kernel_cache(Path(__file__).parent.parent)

@@ -1,15 +1,16 @@
 """The folder in which numba caches the compiled kernels, and a message while they are compiled.
 
 numba invalidates a cached kernel when the file that defines it changes, but not when a function
-that it calls in another file does, although that function is compiled into it. The cache folder
-is therefore named by a digest of all sources of the simulator: changed sources use another folder.
+that it calls in another file does, although that function is compiled into it. The kernels of each
+file are therefore cached in a folder whose name contains a digest of all sources that may be
+compiled into them (`veca_marl.sim.kernel_sources`): changed sources use another folder, and copies
+of the package with the same sources share one.
 
-The folder lies in the user's cache directory, never in the installed package, which may be
-read-only or shared between users. The setting is numba's own and process-wide: kernels of other
-packages that are defined after the import of the simulator are cached in the same folder, so that
-kernels of plug-ins, which may contain functions of the simulator, are invalidated together with
-them. A directory that the user has chosen (`NUMBA_CACHE_DIR`) is used as it is; it has to be
-emptied by hand after an update.
+The folders lie in the user's cache directory, never in the installed package, which may be
+read-only or shared between users, or in the directory that the user has chosen (`NUMBA_CACHE_DIR`).
+The setting is numba's own and process-wide: kernels of other packages that are defined after the
+import of the simulator are cached there too. Those of plug-ins may contain any function of the
+package, so that their folders are named by a digest of all of it.
 
 A cache is never fatal. numba reads its entries as they are: one that was cut off, by a full disk or
 a crash, raises exceptions of pickle, or ends the process inside LLVM. Here each entry ends with a
@@ -23,7 +24,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import inspect
 import io
 import logging
 import os
@@ -34,74 +34,70 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numba
 from numba.core import dispatcher
-from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    IPythonCacheLocator,
+    NullCache,
+    UserProvidedCacheLocator,
+)
 from numba.core.event import Event, Listener, register
+
+from veca_marl.sim.kernel_sources import KernelSources
 
 if sys.platform != "win32":
     import fcntl
 
 KEPT_FOLDERS = 8
-"""Caches of other versions of the sources that are kept; the least recently used are deleted."""
+"""Caches of one file that are kept, of versions of the sources; the least recently used are
+deleted."""
 
 _LOG = logging.getLogger(__name__)
-_DIGEST_CHARACTERS = 16
-_CACHE_NAME = re.compile(f"[0-9a-f]{{{_DIGEST_CHARACTERS}}}")
+_DIGEST = "[0-9a-f]{16}"
 
 
-def configure_kernel_cache(sources: Path) -> None:
-    """Let numba cache kernels in a folder that belongs to the sources as they are now.
+def configure_kernel_cache(package: Path) -> None:
+    """Let numba cache kernels in folders that belong to the sources as they are now.
 
     Has to run before the first kernel is defined. A cache directory that is set already stays.
 
     Args:
-        sources: The folder of the sources that contain kernels or functions that kernels call.
+        package: The folder of the package that contains kernels or functions that kernels call.
     """
     config: Any = numba.config  # numba sets its attributes at run time
     user: Any = dispatcher
-    user.FunctionCache = _make_cache
+    user.FunctionCache = partial(_make_cache, KernelSources(package))
     if config.CACHE_DIR:
         return
     try:
-        config.CACHE_DIR = str(_prepare_folder(source_digest(sources)))
+        config.CACHE_DIR = str(_prepare_directory())
     except OSError as error:
         _report_uncached(str(error))
         config.CACHE_DIR = os.devnull  # no folder: nothing can be cached there
 
 
-def source_digest(sources: Path) -> str:
-    """Return a digest of the names and the contents of all Python files below a folder."""
-    digest = hashlib.sha256()
-    for path in sorted(sources.rglob("*.py")):
-        content = path.read_bytes()
-        digest.update(f"{path.relative_to(sources).as_posix()} {len(content)}\n".encode())
-        digest.update(content)
-    return digest.hexdigest()[:_DIGEST_CHARACTERS]
-
-
-def _prepare_folder(digest: str) -> Path:
-    """Create the folder of a digest in the first directory that is writable, and mark it as used.
+def _prepare_directory() -> Path:
+    """Create the first directory for caches that is writable.
 
     Several processes may do this at once: each step succeeds also if another one did it before.
     """
-    parents = [_user_cache() / "veca_marl" / "kernels", _temporary_cache()]
-    for parent in parents:
-        folder = parent / digest
-        if _is_usable(folder):
-            os.utime(folder)
-            _delete_old_folders(parent)
+    places = [_user_cache() / "veca_marl" / "kernels", _temporary_cache()]
+    for place in places:
+        if _is_usable(place):
             break
-        _LOG.warning("cannot cache kernels in %s: not writable or owned by another user", folder)
+        _LOG.warning("cannot cache kernels in %s: not writable or owned by another user", place)
     else:
-        folder = Path(tempfile.mkdtemp(prefix="veca_marl-kernels-"))
-    if folder.parent != parents[0]:
-        _LOG.warning("compiled kernels are cached in %s; NUMBA_CACHE_DIR changes that", folder)
-    return folder
+        place = Path(tempfile.mkdtemp(prefix="veca_marl-kernels-"))
+    if place != places[0]:
+        _LOG.warning("compiled kernels are cached in %s; NUMBA_CACHE_DIR changes that", place)
+    return place
 
 
 def _user_cache() -> Path:
@@ -112,7 +108,7 @@ def _user_cache() -> Path:
 
 def _temporary_cache() -> Path:
     user = os.getuid() if hasattr(os, "getuid") else "user"
-    return Path(tempfile.gettempdir()) / f"veca_marl-kernels-{user}"
+    return Path(tempfile.gettempdir()) / f"veca_marl-kernels-{user}" / "kernels"
 
 
 def _is_usable(folder: Path) -> bool:
@@ -129,17 +125,22 @@ def _is_usable(folder: Path) -> bool:
     return not hasattr(os, "getuid") or owners == {os.getuid()}
 
 
-def _delete_old_folders(parent: Path) -> None:
-    """Delete the caches that were not used for longest, and nothing else that lies beside them."""
-    caches = sorted(filter(_is_cache, parent.iterdir()), key=_last_use_s, reverse=True)
-    for folder in caches[KEPT_FOLDERS:]:
+def _delete_old_folders(used: Path) -> None:
+    """Delete the caches of one file that were not used for longest, and nothing else beside them.
+
+    Args:
+        used: The folder that is used now.
+    """
+    module = used.name.rpartition("-")[0]
+    named = re.compile(f"{re.escape(module)}-{_DIGEST}")
+    folders = [p for p in used.parent.iterdir() if named.fullmatch(p.name) and _is_folder(p)]
+    for folder in sorted(folders, key=_last_use_s, reverse=True)[KEPT_FOLDERS:]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _is_cache(folder: Path) -> bool:
-    """Return whether a path has the name of a cache, and is a folder itself, not a link to one."""
-    named = _CACHE_NAME.fullmatch(folder.name) is not None
-    return named and folder.is_dir() and not folder.is_symlink()
+def _is_folder(path: Path) -> bool:
+    """Return whether a path is a folder itself, not a link to one."""
+    return path.is_dir() and not path.is_symlink()
 
 
 def _last_use_s(folder: Path) -> float:
@@ -155,37 +156,98 @@ def _report_uncached(reason: str) -> None:
     _LOG.warning("compiled kernels are not cached, each process compiles its own: %s", reason)
 
 
-def _make_cache(function: Any) -> Any:
+def _make_cache(sources: KernelSources, function: Any) -> Any:
     """Return the cache of a kernel: what numba calls in place of its `FunctionCache`.
 
-    A kernel whose folder cannot be written has none: numba would go on to the folder of the
-    sources, or end with an exception.
+    A kernel whose folder cannot be written has none.
     """
     try:
-        made = KernelCache(function)
-    except (OSError, RuntimeError) as error:  # of numba: there is no folder that can be written
-        _report_uncached(" ".join(str(error).split()))
-        return NullCache()
-    config: Any = numba.config
-    in_a_file = os.path.exists(inspect.getfile(function))  # a cell of a notebook is in none
-    if in_a_file and not Path(made.cache_path).is_relative_to(config.CACHE_DIR):
+        return KernelCache(sources, function)
+    except (OSError, RuntimeError):  # of numba: there is no folder that can be written
+        config: Any = numba.config
         _report_uncached(f"{config.CACHE_DIR} cannot be written")
         return NullCache()
-    return made
 
 
 _Cache: Any = FunctionCache
 _Files: Any = IndexDataCacheFile
+_Contents: Any = CompileResultCacheImpl
+_Locator: Any = UserProvidedCacheLocator
+
+
+class SourceLocator(_Locator):  # type: ignore[misc]
+    """Where a kernel is cached: in a folder that is named by the sources that it may contain.
+
+    Args:
+        sources: The sources of the package.
+        function: The function that is compiled.
+        file: The file that defines it.
+    """
+
+    def __init__(self, sources: KernelSources, function: Any, file: str) -> None:
+        super().__init__(function, file)
+        config: Any = numba.config
+        if sources.contain(Path(file)):
+            name = f"{sources.module(Path(file))}-{sources.digest(Path(file))}"
+        else:
+            name = f"{self.get_suitable_cache_subpath(file)}-{sources.digest_of_all()}"
+        self._cache_path = os.path.join(config.CACHE_DIR, name)
+
+    def ensure_cache_path(self) -> None:
+        """Create the folder if it is missing, delete old ones then, and mark it as used."""
+        folder = Path(self._cache_path)
+        is_new = not folder.exists()
+        super().ensure_cache_path()
+        os.utime(folder)
+        if is_new:
+            _delete_old_folders(folder)
+
+
+class SourceLocations:
+    """Makes the locators of kernels that are defined in files, in place of a class of numba.
+
+    Args:
+        sources: The sources of the package.
+    """
+
+    def __init__(self, sources: KernelSources) -> None:
+        self._sources = sources
+
+    def from_function(self, function: Any, file: str) -> SourceLocator | None:
+        """Return where a kernel is cached; None if it is in no file or nothing can be written."""
+        if not os.path.exists(file):
+            return None
+        made = SourceLocator(self._sources, function, file)
+        try:
+            made.ensure_cache_path()
+        except OSError:
+            return None
+        return made
+
+
+class KernelContents(_Contents):  # type: ignore[misc]
+    """What is stored of a kernel, and where. Kernels of notebooks are cached as by numba itself.
+
+    Args:
+        sources: The sources of the package.
+        function: The function that is compiled.
+    """
+
+    def __init__(self, sources: KernelSources, function: Any) -> None:
+        self._locator_classes = [SourceLocations(sources), IPythonCacheLocator]
+        super().__init__(function)
 
 
 class KernelCache(_Cache):  # type: ignore[misc]
     """The cache of one kernel, in which a damaged entry counts as none.
 
     Args:
+        sources: The sources of the package.
         function: The function that is compiled.
     """
 
-    def __init__(self, function: Any) -> None:
+    def __init__(self, sources: KernelSources, function: Any) -> None:
+        self._impl_class = partial(KernelContents, sources)
         super().__init__(function)
         self._cache_file = EntryFile(
             self.cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
