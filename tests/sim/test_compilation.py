@@ -2,13 +2,14 @@
 
 import re
 import sys
+from functools import cache
 from types import ModuleType
 
 from numba import njit
 from numba.core.event import install_listener
 
-from veca_marl.sim import kernel_cache
-from veca_marl.sim.kernel_cache import CompilationNotice, announce_compilation, kernels_left
+from veca_marl.sim import compilation
+from veca_marl.sim.compilation import CompilationNotice, announce_compilation, kernels_left
 
 
 def compile_new_kernel(module):
@@ -63,10 +64,22 @@ def test_kernels_of_other_packages_are_not_announced():
 
 def test_announcing_twice_installs_one_notice(monkeypatch):
     registered = []
-    monkeypatch.setattr(kernel_cache, "register", lambda *what: registered.append(what))
-    announce_compilation.cache_clear()
+    monkeypatch.setattr(compilation, "register", lambda *what: registered.append(what))
+    monkeypatch.setattr(compilation, "_installed", cache(compilation._installed.__wrapped__))
     announce_compilation()
     announce_compilation()
     [(kind, notice)] = registered
     assert kind == "numba:compile"
     assert isinstance(notice, CompilationNotice)
+
+
+def test_what_is_to_begin_begins_with_the_first_kernel_once():
+    begun = []
+    notice = CompilationNotice([].append)
+    notice.begin = lambda: begun.append("now")
+    with install_listener("numba:compile", notice):
+        compile_new_kernel("somewhere.else")
+        assert not begun
+        compile_new_kernel("veca_marl.sim.one")
+        compile_new_kernel("veca_marl.sim.two")
+    assert begun == ["now"]

@@ -1,4 +1,4 @@
-"""The folder in which numba caches the compiled kernels, and a message while they are compiled.
+"""The folders in which numba caches the compiled kernels.
 
 numba invalidates a cached kernel when the file that defines it changes, but not when a function
 that it calls in another file does, although that function is compiled into it. The kernels of each
@@ -33,7 +33,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -48,7 +48,6 @@ from numba.core.caching import (
     NullCache,
     UserProvidedCacheLocator,
 )
-from numba.core.event import Event, Listener, register
 
 from veca_marl.sim.kernel_sources import KernelSources
 
@@ -273,7 +272,7 @@ class DamagedEntryError(Exception):
 
 
 _LONGEST_WAIT_S = 180.0  # a kernel is compiled within 30 s, on a machine that is busy as well
-_POLL_S = 0.1
+_POLL_S = 0.02
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 
@@ -361,7 +360,7 @@ class EntryFile(_Files):  # type: ignore[misc]
         while not (taken := _take(turn)) and time.monotonic() < deadline:
             if not waits:
                 waits = True
-                _to_stderr("another process compiles kernels; waiting for it ...")
+                _tell_waiting()
             time.sleep(_POLL_S)
         if taken:
             self._turn = turn
@@ -376,6 +375,12 @@ class EntryFile(_Files):  # type: ignore[misc]
             self._turn = None
 
 
+@cache
+def _tell_waiting() -> None:
+    """Say once that this process waits."""
+    print("another process compiles kernels; waiting for it ...", file=sys.stderr)
+
+
 _PICKLE_ERRORS = (
     pickle.UnpicklingError,
     EOFError,
@@ -386,6 +391,27 @@ _PICKLE_ERRORS = (
     ValueError,
 )
 """What pickle raises for entries that were written by other versions."""
+
+
+def take_place(name: str) -> int | None:
+    """Take a place that at most one process has; it is free again when all copies are closed.
+
+    Args:
+        name: Name of the place.
+
+    Returns:
+        An open file, which child processes may inherit; None if the place is taken or nothing can
+        be cached.
+    """
+    config: Any = numba.config
+    try:
+        place = os.open(Path(config.CACHE_DIR, f"{name}.lock"), os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError:
+        return None
+    if _take(place):
+        return place
+    os.close(place)
+    return None
 
 
 def _check_digest(path: str) -> None:
@@ -411,91 +437,3 @@ def _take(file: int) -> bool:
     except OSError:  # a file system without locks: each process compiles for itself
         return True
     return True
-
-
-_TOLD_EVERY_S = 10.0
-
-
-class CompilationNotice(Listener):
-    """Writes a line when the first kernel of this package is compiled, and then how many are left.
-
-    Kernels that are loaded from the cache are not mentioned.
-
-    Args:
-        write: Function that takes a line.
-        every_s: Time between two lines.
-    """
-
-    def __init__(self, write: Callable[[str], object], every_s: float = _TOLD_EVERY_S) -> None:
-        self._write, self._every_s = write, every_s
-        self._told_s: float | None = None
-        self._depth, self._done = 0, 0  # kernels that call others compile these meanwhile
-        self._begun_s = 0.0
-        self._taken_s = 0.0
-
-    def on_start(self, event: Event) -> None:
-        """See `numba.core.event.Listener`."""
-        if not _is_ours(event):
-            return
-        if self._depth == 0:
-            self._begun_s = time.process_time()
-        self._depth += 1
-        if self._told_s is None:
-            self._told_s = time.monotonic()
-            self._write(_FIRST_LINE)
-
-    def on_end(self, event: Event) -> None:
-        """See `numba.core.event.Listener`."""
-        if not _is_ours(event) or self._depth == 0:
-            return
-        self._depth -= 1
-        self._done += 1
-        if self._depth == 0:
-            self._taken_s += time.process_time() - self._begun_s
-        if self._told_s is not None and time.monotonic() - self._told_s >= self._every_s:
-            self._told_s = time.monotonic()
-            running_s = time.process_time() - self._begun_s if self._depth else 0.0
-            self._write(
-                f"compiling kernels: {self._done} done, at most {kernels_left()} left, "
-                f"{self._taken_s + running_s:.0f} s of processor time"
-            )
-
-
-_FIRST_LINE = "compiling kernels (once; they are cached): about a minute of processor time ..."
-
-
-def _is_ours(event: Event) -> bool:
-    module: str = event.data["dispatcher"].py_func.__module__
-    return module.startswith("veca_marl.")
-
-
-def kernels_left() -> int:
-    """Return how many kernels of the imported modules are neither compiled nor in the cache.
-
-    A game needs a part of them only.
-    """
-    modules = [m for name, m in list(sys.modules.items()) if name.startswith("veca_marl.")]
-    named = {id(v): v for module in modules for v in vars(module).values()}
-    kernels = [v for v in named.values() if isinstance(v, dispatcher.Dispatcher)]
-    return sum(not kernel.overloads and not _is_stored(kernel) for kernel in kernels)
-
-
-def _is_stored(kernel: Any) -> bool:
-    """Return whether something is in the cache of a kernel, or nothing ever will be."""
-    if kernel.targetoptions.get("inline") == "always":
-        return True
-    stored: Any = getattr(kernel, "_cache", None)
-    return isinstance(stored, KernelCache) and stored.is_stored
-
-
-@cache
-def announce_compilation() -> None:
-    """Install the notice in this process; further calls have no effect.
-
-    It listens to events of numba's compiler: calls of compiled kernels take no additional time.
-    """
-    register("numba:compile", CompilationNotice(_to_stderr))
-
-
-def _to_stderr(line: str) -> None:
-    print(line, file=sys.stderr)

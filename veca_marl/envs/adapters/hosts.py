@@ -13,11 +13,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from veca_marl.envs.core.compile_ahead import FurtherProcesses
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.global_state import GlobalState
 from veca_marl.envs.rendering import Spectator
-from veca_marl.sim.kernel_cache import announce_compilation
+from veca_marl.sim.compilation import announce_compilation
 
 
 class StateReader(Protocol):
@@ -73,8 +74,8 @@ class ThisProcess(Host):
     """Plays games in the process that asks for them."""
 
     def make(self, cfg: GameCfg, worlds: int) -> list[Game]:
-        """See `Host`; the compilation of kernels is announced."""
-        announce_compilation()
+        """See `Host`; kernels are compiled by further processes too, and that is announced."""
+        announce_compilation(FurtherProcesses(cfg))
         return [Game(cfg) for _ in range(worlds)]
 
     def reset(self, games: Sequence[Game], rngs: Sequence[np.random.Generator]) -> None:

@@ -1,0 +1,101 @@
+"""Further processes that compile kernels while a game is played for the first time on a machine.
+
+Only playing a game tells which kernels it needs. A further process therefore makes the same game
+and reads its senses in another order. Each kernel is compiled by one process
+(`veca_marl.sim.kernel_cache`), so that the process that plays finds in the cache what the others
+have compiled meanwhile.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import pickle
+import subprocess
+import sys
+from contextlib import closing, suppress
+from typing import Any
+
+import numba
+import numpy as np
+
+from veca_marl.envs.core.game import Game, random_action
+from veca_marl.envs.core.game_cfg import GameCfg
+from veca_marl.processes.cores import usable_cores
+from veca_marl.sim.kernel_cache import take_place
+
+MOST_PROCESSES = 3
+"""Further processes at most: the kernels of eyes, ears and skin."""
+
+
+class FurtherProcesses:
+    """Compiles the kernels of a game in further processes, one for each core but that of this one.
+
+    They end by themselves. What they cannot do, because the game has classes that another process
+    cannot import, is left to this process.
+
+    Args:
+        cfg: The game.
+    """
+
+    def __init__(self, cfg: GameCfg) -> None:
+        self._cfg = cfg
+        self._most = min(usable_cores() - 1, MOST_PROCESSES)
+        self._running: list[subprocess.Popen[bytes]] = []
+
+    def __call__(self) -> None:
+        """Start the processes, but those that another process has started already."""
+        for number in range(self._most):
+            place = take_place(f"further_process_{number}")
+            if place is None:
+                continue
+            try:
+                self._running.append(_start(pickle.dumps((number, self._cfg)), place))
+            except _NO_PROCESS as error:
+                _LOG.warning("kernels are compiled by one process alone: %s", error)
+            finally:
+                os.close(place)  # the child has a copy
+
+
+_LOG = logging.getLogger(__name__)
+_NO_PROCESS = (OSError, pickle.PicklingError, AttributeError, TypeError)
+"""Raised where no process can be started, and by pickle for classes defined in functions."""
+
+
+def _start(packed: bytes, place: int) -> subprocess.Popen[bytes]:
+    settings: Any = numba.config  # numba sets its attributes at run time
+    paths = {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": settings.CACHE_DIR}
+    child = subprocess.Popen(
+        [sys.executable, "-m", __name__],
+        env=os.environ | paths,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        pass_fds=[place],
+    )
+    assert child.stdin is not None
+    with suppress(BrokenPipeError), child.stdin:
+        child.stdin.write(packed)
+    return child
+
+
+def play_in_another_order(cfg: GameCfg, number: int) -> None:
+    """Make a game, read the senses of its players from the last to the first, and play one step.
+
+    Args:
+        cfg: The game.
+        number: How many senses from the end are left for last.
+    """
+    rng = np.random.default_rng(0)
+    with closing(Game(cfg)) as game:
+        game.reset(rng)
+        for player in game.players:
+            names = list(reversed(game.senses[player.name]))
+            for name in names[number:] + names[:number]:
+                game.observe(player, [name])
+        game.step({p.name: random_action(p.body.action_spec, rng) for p in game.actors})
+
+
+if __name__ == "__main__":
+    chosen_number, chosen_cfg = pickle.load(sys.stdin.buffer)
+    play_in_another_order(chosen_cfg, chosen_number)
