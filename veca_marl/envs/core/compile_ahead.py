@@ -14,6 +14,7 @@ import pickle
 import subprocess
 import sys
 from contextlib import closing, suppress
+from threading import Thread
 from typing import Any
 
 import numba
@@ -41,7 +42,6 @@ class FurtherProcesses:
     def __init__(self, cfg: GameCfg) -> None:
         self._cfg = cfg
         self._most = min(usable_cores() - 1, MOST_PROCESSES)
-        self._running: list[subprocess.Popen[bytes]] = []
 
     def __call__(self) -> None:
         """Start the processes, but those that another process has started already."""
@@ -50,7 +50,7 @@ class FurtherProcesses:
             if place is None:
                 continue
             try:
-                self._running.append(_start(pickle.dumps((number, self._cfg)), place))
+                _start(pickle.dumps((number, self._cfg)), place)
             except _NO_PROCESS as error:
                 _LOG.warning("kernels are compiled by one process alone: %s", error)
             finally:
@@ -62,7 +62,7 @@ _NO_PROCESS = (OSError, pickle.PicklingError, AttributeError, TypeError)
 """Raised where no process can be started, and by pickle for classes defined in functions."""
 
 
-def _start(packed: bytes, place: int) -> subprocess.Popen[bytes]:
+def _start(packed: bytes, place: int) -> None:
     settings: Any = numba.config  # numba sets its attributes at run time
     paths = {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": settings.CACHE_DIR}
     child = subprocess.Popen(
@@ -76,7 +76,7 @@ def _start(packed: bytes, place: int) -> subprocess.Popen[bytes]:
     assert child.stdin is not None
     with suppress(BrokenPipeError), child.stdin:
         child.stdin.write(packed)
-    return child
+    Thread(target=child.wait, daemon=True).start()  # takes its exit status when it ends
 
 
 def play_in_another_order(cfg: GameCfg, number: int) -> None:
