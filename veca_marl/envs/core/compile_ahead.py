@@ -26,7 +26,7 @@ from veca_marl.processes.cores import usable_cores
 from veca_marl.sim.kernel_cache import take_place
 
 MOST_PROCESSES = 3
-"""Further processes at most: the kernels of eyes, ears and skin."""
+"""Further processes at most, for eyes, ears and skin."""
 
 
 class FurtherProcesses:
