@@ -1,6 +1,7 @@
 """Compiled kernels are cached outside the package, in folders that belong to their sources."""
 
 import ast
+import inspect
 import os
 import shutil
 import subprocess
@@ -10,6 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from numba import types
+from numba.core.dispatcher import Dispatcher
 
 import veca_marl
 from veca_marl.sim import kernel_cache, kernel_sources
@@ -218,6 +221,43 @@ def imported(file):
             yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
+
+
+@pytest.mark.parametrize("task", ["KickTheBall", "TurnBaby"])
+def test_named_tuples_that_a_kernel_is_given_are_defined_in_what_its_module_imports(task):
+    """numba knows them by name: other fields in another order would find the old kernel."""
+    env = veca_marl.make(task, seed=0)
+    env.rollout(1)
+    env.close()
+    sources = KernelSources(Path(veca_marl.__file__).parent)
+    found = 0
+    for kernel in kernels():
+        closure = sources.closure(Path(inspect.getfile(kernel.py_func)))
+        for signature in set(kernel.overloads) | stored_signatures(kernel):
+            for given in named_tuples(signature):
+                found += 1
+                assert Path(inspect.getfile(given)) in closure, (kernel, given)
+    assert found > 10
+
+
+def kernels():
+    """Return all kernels of the modules that are imported."""
+    modules = [module for name, module in sys.modules.items() if name.startswith("veca_marl.")]
+    named = {id(value): value for module in modules for value in vars(module).values()}
+    return [v for v in named.values() if isinstance(v, Dispatcher)]
+
+
+def stored_signatures(kernel):
+    return {key[0] for key in kernel._cache._cache_file._load_index()}
+
+
+def named_tuples(given):
+    """Yield the classes of the named tuples in a type or in a signature."""
+    if isinstance(given, (types.NamedTuple, types.NamedUniTuple)):
+        yield given.instance_class
+    if isinstance(given, (tuple, types.BaseTuple)):
+        for part in given:
+            yield from named_tuples(part)
 
 
 def test_kernels_do_not_depend_on_most_of_the_simulator():

@@ -26,7 +26,7 @@ from typing import Any
 from veca_marl.config import Config, ConfigError, one_line
 from veca_marl.config.choices import compose_game
 from veca_marl.config.command_line import CommandLine
-from veca_marl.envs.core.compile_ahead import FurtherProcesses
+from veca_marl.envs.core.compile_ahead import CompileWorkers
 from veca_marl.envs.core.game import Game
 from veca_marl.runs.served_worlds import game_text, import_remote
 from veca_marl.sim.compilation import announce_compilation
@@ -123,7 +123,7 @@ def _serve(options: ServeOptions, overrides: list[str]) -> None:
 def _specs(cfg: Config) -> Any:
     """Return the specs of the game; one world is built and closed for it."""
     description = import_remote("description")
-    announce_compilation(FurtherProcesses(cfg.game))
+    announce_compilation(CompileWorkers(cfg.game))
     with closing(Game(cfg.game)) as game:
         return description.GameSpecs.of(game, game_text(cfg.game))
 

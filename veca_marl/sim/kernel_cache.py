@@ -2,9 +2,9 @@
 
 numba invalidates a cached kernel when the file that defines it changes, but not when a function
 that it calls in another file does, although that function is compiled into it. The kernels of each
-file are therefore cached in a folder whose name contains a digest of all sources that may be
-compiled into them (`veca_marl.sim.kernel_sources`): changed sources use another folder, and copies
-of the package with the same sources share one.
+file are therefore cached in a folder that is named by a digest of all sources that may be compiled
+into them (`veca_marl.sim.kernel_sources`): changed sources use another folder, and copies of the
+package with the same sources share one.
 
 The folders lie in the user's cache directory, never in the installed package, which may be
 read-only or shared between users, or in the directory that the user has chosen (`NUMBA_CACHE_DIR`).
@@ -87,16 +87,16 @@ def _prepare_directory() -> Path:
 
     Several processes may do this at once: each step succeeds also if another one did it before.
     """
-    places = [_user_cache() / "veca_marl" / "kernels", _temporary_cache()]
-    for place in places:
-        if _is_usable(place):
+    candidates = [_user_cache() / "veca_marl" / "kernels", _temporary_cache()]
+    for directory in candidates:
+        if _is_usable(directory):
             break
-        _LOG.warning("cannot cache kernels in %s: not writable or owned by another user", place)
+        _LOG.warning("cannot cache kernels in %s: not writable or owned by another user", directory)
     else:
-        place = Path(tempfile.mkdtemp(prefix="veca_marl-kernels-"))
-    if place != places[0]:
-        _LOG.warning("compiled kernels are cached in %s; NUMBA_CACHE_DIR changes that", place)
-    return place
+        directory = Path(tempfile.mkdtemp(prefix="veca_marl-kernels-"))
+    if directory != candidates[0]:
+        _LOG.warning("compiled kernels are cached in %s; NUMBA_CACHE_DIR changes that", directory)
+    return directory
 
 
 def _user_cache() -> Path:
@@ -158,7 +158,7 @@ def _report_uncached(reason: str) -> None:
 def _make_cache(sources: KernelSources, function: Any) -> Any:
     """Return the cache of a kernel: what numba calls in place of its `FunctionCache`.
 
-    A kernel whose folder cannot be written has none.
+    Where the folder cannot be written, a kernel is compiled without a cache.
     """
     try:
         return KernelCache(sources, function)
@@ -393,24 +393,24 @@ _PICKLE_ERRORS = (
 """What pickle raises for entries that were written by other versions."""
 
 
-def take_place(name: str) -> int | None:
-    """Take a place that at most one process has; it is free again when all copies are closed.
+def take_lock(name: str) -> int | None:
+    """Take a lock in the cache directory, without waiting.
 
     Args:
-        name: Name of the place.
+        name: Name of the lock.
 
     Returns:
-        An open file, which child processes may inherit; None if the place is taken or nothing can
-        be cached.
+        The descriptor of an open file, which child processes may inherit: the lock is held until
+        all copies are closed. None if it is held already, or if nothing can be cached.
     """
     config: Any = numba.config
     try:
-        place = os.open(Path(config.CACHE_DIR, f"{name}.lock"), os.O_RDWR | os.O_CREAT, 0o600)
+        lock = os.open(Path(config.CACHE_DIR, f"{name}.lock"), os.O_RDWR | os.O_CREAT, 0o600)
     except OSError:
         return None
-    if _take(place):
-        return place
-    os.close(place)
+    if _take(lock):
+        return lock
+    os.close(lock)
     return None
 
 

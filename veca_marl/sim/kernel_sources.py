@@ -24,8 +24,7 @@ _NAME = re.compile(r"(\w+)(?:\s+as\s+\w+)?")
 class KernelSources:
     """The Python files of a package.
 
-    They are read once, so that what is compiled and its digest belong to the same text unless a
-    file changes while the package is being imported.
+    Each file is read once.
 
     Args:
         package: The folder of the package. Its modules import each other by absolute names.
@@ -56,7 +55,9 @@ class KernelSources:
 
     def digest_of_all(self) -> str:
         """Return a digest of all files of the package and the version of numba."""
-        return self._digest_of(set(self._package.rglob("*.py")))
+        if self._package not in self._digests:
+            self._digests[self._package] = self._digest_of(set(self._package.rglob("*.py")))
+        return self._digests[self._package]
 
     def imports(self, file: Path) -> set[Path]:
         """Return the files of the package that a file of it imports."""

@@ -1,4 +1,4 @@
-"""Further processes compile the kernels of a game while it is played for the first time."""
+"""Worker processes compile the kernels of a game while it is played for the first time."""
 
 import json
 import os
@@ -11,25 +11,25 @@ import pytest
 from composed import compose
 
 from veca_marl.envs.core import compile_ahead
-from veca_marl.envs.core.compile_ahead import FurtherProcesses, play_in_another_order
+from veca_marl.envs.core.compile_ahead import CompileWorkers, play_in_another_order
 from veca_marl.envs.core.game import Game
-from veca_marl.sim.kernel_cache import take_place
+from veca_marl.sim.kernel_cache import take_lock
 
 
 class Started:
-    """In place of the function that starts a process; each keeps its place until `end`."""
+    """In place of the function that starts a worker; each holds its lock until `end`."""
 
     def __init__(self):
-        self.messages, self._places = [], []
+        self.messages, self._locks = [], []
 
-    def __call__(self, packed, place):
+    def __call__(self, packed, lock):
         self.messages.append(pickle.loads(packed))
-        self._places.append(os.dup(place))
+        self._locks.append(os.dup(lock))
 
     def end(self):
-        for place in self._places:
-            os.close(place)
-        self._places.clear()
+        for lock in self._locks:
+            os.close(lock)
+        self._locks.clear()
 
 
 @pytest.fixture
@@ -46,41 +46,41 @@ def game(*overrides):
 
 
 @pytest.mark.parametrize(("cores", "count"), [(1, 0), (2, 1), (3, 2), (64, 3)])
-def test_one_process_for_each_further_core_and_no_more_than_there_are_kinds_of_senses(
+def test_one_worker_for_each_further_core_and_no_more_than_there_are_kinds_of_senses(
     started, monkeypatch, cores, count
 ):
     monkeypatch.setattr(compile_ahead, "usable_cores", lambda: cores)
     cfg = game()
-    FurtherProcesses(cfg)()
+    CompileWorkers(cfg)()
     assert started.messages == [(number, cfg) for number in range(count)]
 
 
-def test_where_others_are_at_work_no_process_is_started(started, monkeypatch):
+def test_where_others_are_at_work_no_worker_is_started(started, monkeypatch):
     monkeypatch.setattr(compile_ahead, "usable_cores", lambda: 4)
-    FurtherProcesses(game())()
-    FurtherProcesses(game())()
+    CompileWorkers(game())()
+    CompileWorkers(game())()
     assert len(started.messages) == 3
     started.end()
-    FurtherProcesses(game())()
+    CompileWorkers(game())()
     assert len(started.messages) == 6
 
 
-def test_a_place_is_taken_until_all_copies_are_closed(monkeypatch, tmp_path):
+def test_a_lock_is_held_until_all_copies_are_closed(monkeypatch, tmp_path):
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    place = take_place("somewhere")
-    copy = os.dup(place)
-    os.close(place)
-    assert take_place("somewhere") is None
+    lock = take_lock("somewhere")
+    copy = os.dup(lock)
+    os.close(lock)
+    assert take_lock("somewhere") is None
     os.close(copy)
-    again = take_place("somewhere")
+    again = take_lock("somewhere")
     assert again is not None
     os.close(again)
 
 
-def test_without_a_cache_no_process_is_started(started, monkeypatch):
+def test_without_a_cache_no_worker_is_started(started, monkeypatch):
     monkeypatch.setattr(numba.config, "CACHE_DIR", os.devnull)
     monkeypatch.setattr(compile_ahead, "usable_cores", lambda: 4)
-    FurtherProcesses(game())()
+    CompileWorkers(game())()
     assert not started.messages
 
 
@@ -89,7 +89,7 @@ def test_what_cannot_be_packed_is_left_to_this_process(started, monkeypatch, cap
         pass
 
     monkeypatch.setattr(compile_ahead, "usable_cores", lambda: 2)
-    FurtherProcesses(Local())()
+    CompileWorkers(Local())()
     assert not started.messages
     assert "Local" in caplog.text
 
@@ -123,7 +123,7 @@ json.dump([sum(k.stats.cache_misses.values()) for k in kernels], sys.stdout)
 
 
 @pytest.mark.slow
-def test_a_further_process_compiles_what_this_one_needs_last(tmp_path):
+def test_a_worker_compiles_what_this_one_needs_last(tmp_path):
     """Eyes are read first here and last there; what is heard is the other way round."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path), "VECA_MARL_CORES": "2"}
     words = [sys.executable, "-c", PROGRAM]

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.envs.core.compile_ahead import FurtherProcesses
+from veca_marl.envs.core.compile_ahead import CompileWorkers
 from veca_marl.envs.core.game import Game, Outcome
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.envs.core.global_state import GlobalState
@@ -74,8 +74,8 @@ class ThisProcess(Host):
     """Plays games in the process that asks for them."""
 
     def make(self, cfg: GameCfg, worlds: int) -> list[Game]:
-        """See `Host`; kernels are compiled by further processes too, and that is announced."""
-        announce_compilation(FurtherProcesses(cfg))
+        """See `Host`; kernels are compiled by workers too, and that is announced."""
+        announce_compilation(CompileWorkers(cfg))
         return [Game(cfg) for _ in range(worlds)]
 
     def reset(self, games: Sequence[Game], rngs: Sequence[np.random.Generator]) -> None:

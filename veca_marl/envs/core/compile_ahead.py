@@ -1,9 +1,9 @@
-"""Further processes that compile kernels while a game is played for the first time on a machine.
+"""Worker processes that compile kernels while a game is played for the first time on a machine.
 
-Only playing a game tells which kernels it needs. A further process therefore makes the same game
-and reads its senses in another order. Each kernel is compiled by one process
-(`veca_marl.sim.kernel_cache`), so that the process that plays finds in the cache what the others
-have compiled meanwhile.
+Which kernels a game needs, with which types of arguments, is known only by playing it. A worker
+therefore makes the same game and reads its senses in another order. Each kernel is compiled by one
+process (`veca_marl.sim.kernel_cache`), so that the process that plays finds in the cache what the
+workers have compiled meanwhile.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ import numpy as np
 from veca_marl.envs.core.game import Game, random_action
 from veca_marl.envs.core.game_cfg import GameCfg
 from veca_marl.processes.cores import usable_cores
-from veca_marl.sim.kernel_cache import take_place
+from veca_marl.sim.kernel_cache import take_lock
 
-MOST_PROCESSES = 3
-"""Further processes at most, for eyes, ears and skin."""
+MOST_WORKERS = 3
+"""Workers at most, for eyes, ears and skin."""
 
 
-class FurtherProcesses:
-    """Compiles the kernels of a game in further processes, one for each core but that of this one.
+class CompileWorkers:
+    """Compiles the kernels of a game in worker processes, one for each core but that of this one.
 
     They end by themselves. What they cannot do, because the game has classes that another process
     cannot import, is left to this process.
@@ -41,28 +41,28 @@ class FurtherProcesses:
 
     def __init__(self, cfg: GameCfg) -> None:
         self._cfg = cfg
-        self._most = min(usable_cores() - 1, MOST_PROCESSES)
+        self._most = min(usable_cores() - 1, MOST_WORKERS)
 
     def __call__(self) -> None:
-        """Start the processes, but those that another process has started already."""
+        """Start the workers, but those that another process has started already."""
         for number in range(self._most):
-            place = take_place(f"further_process_{number}")
-            if place is None:
+            lock = take_lock(f"compile_worker_{number}")
+            if lock is None:
                 continue
             try:
-                _start(pickle.dumps((number, self._cfg)), place)
-            except _NO_PROCESS as error:
+                _start(pickle.dumps((number, self._cfg)), lock)
+            except _NO_WORKER as error:
                 _LOG.warning("kernels are compiled by one process alone: %s", error)
             finally:
-                os.close(place)  # the child has a copy
+                os.close(lock)  # the worker has a copy
 
 
 _LOG = logging.getLogger(__name__)
-_NO_PROCESS = (OSError, pickle.PicklingError, AttributeError, TypeError)
+_NO_WORKER = (OSError, pickle.PicklingError, AttributeError, TypeError)
 """Raised where no process can be started, and by pickle for classes defined in functions."""
 
 
-def _start(packed: bytes, place: int) -> None:
+def _start(packed: bytes, lock: int) -> None:
     settings: Any = numba.config  # numba sets its attributes at run time
     paths = {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": settings.CACHE_DIR}
     child = subprocess.Popen(
@@ -71,7 +71,7 @@ def _start(packed: bytes, place: int) -> None:
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        pass_fds=[place],
+        pass_fds=[lock],
     )
     assert child.stdin is not None
     with suppress(BrokenPipeError), child.stdin:
