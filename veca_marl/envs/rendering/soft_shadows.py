@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 from veca_marl.sim.vision.rasterizer import Depths, Lens, Surfaces
 
 Plane: TypeAlias = tuple[float, float, float, float, float, float]
@@ -45,7 +45,7 @@ def _disc(count: int, power: float) -> Floats:
 BLOCKER_DISC, SAMPLE_DISC = _disc(_BLOCKERS, 1.5), _disc(_SAMPLES, 0.5)
 
 
-@compiled
+@kernel
 def sunlit_fractions(
     view: Floats,
     lens: Lens,
@@ -143,7 +143,7 @@ def _noise(i: int, j: int) -> float:
     return mixed - math.floor(mixed)
 
 
-@compiled
+@kernel
 def _fraction(
     plane: Plane,
     cosine: float,
@@ -206,7 +206,7 @@ def _point(view: Floats, lens: Lens, depth: Depths, j: int, i: int) -> tuple[flo
     )
 
 
-@compiled
+@kernel
 def _normal(
     view: Floats, lens: Lens, depth: Depths, surfaces: Surfaces, j: int, i: int
 ) -> tuple[float, float, float]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.poses import Floats
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 
 Indices = NDArray[np.int64]
 
@@ -129,7 +129,7 @@ def with_mesh(table: MeshTable, mesh: Mesh, first_row: int) -> MeshTable:
     return MeshTable(*columns)
 
 
-@compiled
+@kernel
 def deform_meshes(meshes: MeshTable, positions: Floats, rotations: Floats) -> None:
     """Compute all vertices from their frames, then the normals and the bounding boxes.
 
@@ -143,7 +143,7 @@ def deform_meshes(meshes: MeshTable, positions: Floats, rotations: Floats) -> No
     _write_bounds(meshes)
 
 
-@compiled
+@kernel
 def blend(
     frames: Indices,
     weights: Floats,
@@ -168,7 +168,7 @@ def blend(
         vertices[v, 0], vertices[v, 1], vertices[v, 2] = x, y, z
 
 
-@compiled
+@kernel
 def _write_normals(triangles: Indices, vertices: Floats, normals: Floats) -> None:
     """Mean of the normals of the triangles at each vertex, weighted by their areas."""
     normals[:] = 0.0
@@ -189,7 +189,7 @@ def _write_normals(triangles: Indices, vertices: Floats, normals: Floats) -> Non
         normals[v, 0], normals[v, 1], normals[v, 2] = x * scale, y * scale, z * scale
 
 
-@compiled
+@kernel
 def _write_bounds(meshes: MeshTable) -> None:
     """Axis-aligned bounding box of each mesh."""
     for m in range(meshes.lower.shape[0]):

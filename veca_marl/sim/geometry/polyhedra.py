@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from veca_marl.sim.geometry.poses import Floats, Vector
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 
 MAX_TRIANGLES = 128
 """Drawing and touch examine every face; more than this belongs into several props."""
@@ -222,7 +222,7 @@ def joined_rows(polyhedra: Sequence[Polyhedron]) -> Floats:
     return np.concatenate([np.zeros((0, FACE_COLUMNS)), *map(face_rows, polyhedra)])
 
 
-@compiled
+@kernel
 def nearest_plane(faces: Floats, size: Vector, x: float, y: float, z: float) -> tuple[float, int]:
     """Return the greatest distance of a point above the planes of the faces, and its row."""
     first = int(size[0])
@@ -234,7 +234,7 @@ def nearest_plane(faces: Floats, size: Vector, x: float, y: float, z: float) -> 
     return highest, row
 
 
-@compiled
+@kernel
 def polyhedron_distance(faces: Floats, size: Vector, x: float, y: float, z: float) -> float:
     """Return the signed distance of a point, metres; negative inside."""
     highest, _ = nearest_plane(faces, size, x, y, z)
@@ -244,7 +244,7 @@ def polyhedron_distance(faces: Floats, size: Vector, x: float, y: float, z: floa
     return math.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2)
 
 
-@compiled
+@kernel
 def limited_distance(
     faces: Floats, size: Vector, x: float, y: float, z: float, limit_m: float
 ) -> float:
@@ -263,7 +263,7 @@ def limited_distance(
     return math.sqrt((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2)
 
 
-@compiled
+@kernel
 def polyhedron_gradient(
     faces: Floats, size: Vector, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
@@ -277,7 +277,7 @@ def polyhedron_gradient(
     return highest, faces[row, 0], faces[row, 1], faces[row, 2]
 
 
-@compiled
+@kernel
 def polyhedron_entry(faces: Floats, size: Vector, point: Vector, direction: Vector) -> float:
     """Return the distance to where a ray enters from outside, see `entry_distance`."""
     (x, y, z), (u, v, w) = point, direction
@@ -295,7 +295,7 @@ def polyhedron_entry(faces: Floats, size: Vector, point: Vector, direction: Vect
     return enter if 0.0 <= enter <= leave else NO_ENTRY_M
 
 
-@compiled
+@kernel
 def _nearest_point(faces: Floats, size: Vector, x: float, y: float, z: float) -> Vector:
     """Return the point of the surface nearest to a point outside."""
     first, best = int(size[0]), _FAR_M
@@ -311,7 +311,7 @@ def _nearest_point(faces: Floats, size: Vector, x: float, y: float, z: float) ->
     return nearest
 
 
-@compiled
+@kernel
 def nearest_on_triangle(faces: Floats, f: int, x: float, y: float, z: float) -> Vector:
     """Return the point of a triangle that is nearest to a point.
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry.polyhedra import Polyhedron
 from veca_marl.sim.geometry.poses import Floats, Pose, rotation_with_z, single
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 
 
 class Shape(IntEnum):
@@ -163,7 +163,7 @@ _SPHERE, _BOX, _POLYHEDRON = int(Shape.SPHERE), int(Shape.BOX), int(Shape.POLYHE
 _HALF = single(0.5)
 
 
-@compiled
+@kernel
 def bounding_radius(shape: int, size: NDArray[np.float32]) -> float:
     """Radius of a sphere about the centre that contains the primitive."""
     if shape == _SPHERE:

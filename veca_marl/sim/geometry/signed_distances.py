@@ -31,7 +31,7 @@ from veca_marl.sim.geometry.polyhedra import (
 )
 from veca_marl.sim.geometry.poses import Floats, Vector
 from veca_marl.sim.geometry.primitives import Primitive, Shape
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 
 DistanceAndGradient: TypeAlias = tuple[float, float, float, float]
 Solid: TypeAlias = tuple[int, Vector] | tuple[Floats, Vector]
@@ -78,7 +78,7 @@ def is_inside(shape: int, size: Vector, x: float, y: float, z: float) -> bool:
     return x * x + y * y + z * z < size[0] * size[0]
 
 
-@compiled
+@kernel
 def distance_and_gradient(
     shape: int, size: Vector, x: float, y: float, z: float
 ) -> DistanceAndGradient:
@@ -138,7 +138,7 @@ def _from_cylinder(radius: float, half: float, x: float, y: float, z: float) -> 
     return end, 0.0, 0.0, sz
 
 
-@compiled
+@kernel
 def entry_distance(shape: int, size: Vector, point: Vector, direction: Vector) -> float:
     """Return the distance from a point outside a primitive to where a ray enters it.
 
@@ -297,7 +297,7 @@ overload(solid_entry, jit_options=_OPTIONS)(
 )
 
 
-@compiled
+@kernel
 def _write_distances(solid: Solid, points: Floats, out: Floats) -> None:
     for i in range(points.shape[0]):
         out[i] = solid_distance(solid, points[i, 0], points[i, 1], points[i, 2])

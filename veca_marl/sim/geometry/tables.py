@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry.polyhedra import joined_rows, sizes_of
 from veca_marl.sim.geometry.poses import Floats
 from veca_marl.sim.geometry.primitives import Primitive
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 
 Bools = NDArray[np.bool_]
 
@@ -165,7 +165,7 @@ def appended(table: GeomTable, more: GeomTable) -> GeomTable:
     return GeomTable(*columns)
 
 
-@compiled
+@kernel
 def compose(
     frame_positions: Floats,
     frame_rotations: Floats,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.hearing.hrtf import HrtfTable
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound import NEAR_FIELD_M, SPEED_OF_SOUND_MPS
 
 NEAREST_RADII = 1.25
@@ -24,7 +24,7 @@ _CENTRE_RADII = 0.1
 is none at the centre, and no real source is there."""
 
 
-@compiled
+@kernel
 def sphere_gain(radius_over_distance: float, cosine: float) -> float:
     """Return the pressure at low frequency on a rigid sphere, relative to the free field's.
 
@@ -49,7 +49,7 @@ def sphere_gain(radius_over_distance: float, cosine: float) -> float:
     return 2.0 / root - math.log(ratio) / x
 
 
-@compiled
+@kernel
 def near_field_gain(radius_m: float, distance_m: float, reference_m: float, cosine: float) -> float:
     """Return the factor of the level at an ear for a source that is not as far as the measured one.
 
@@ -69,12 +69,12 @@ def near_field_gain(radius_m: float, distance_m: float, reference_m: float, cosi
     return near / sphere_gain(radius_m / reference_m, cosine)
 
 
-@compiled
+@kernel
 def _length(vector: Floats) -> float:
     return float(np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2))
 
 
-@compiled
+@kernel
 def omnidirectional_paths(
     arrivals: Floats,
     gains: Floats,
@@ -102,7 +102,7 @@ def omnidirectional_paths(
             filters[k, ear, 0] = np.float32(gains[k] / max(distance, nearest_m))
 
 
-@compiled
+@kernel
 def _grid_cell(
     arrival: Floats, distance: float, n_azimuths: int, n_elevations: int
 ) -> tuple[int, int, int, float, float]:
@@ -116,7 +116,7 @@ def _grid_cell(
     return near, far, low, azimuth - below, elevation - low
 
 
-@compiled
+@kernel
 def head_related_paths(
     arrivals: Floats,
     gains: Floats,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.kernels import compiled, kernel
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.attenuated_paths import Reflector, energies_between, energies_inside
 from veca_marl.sim.sound.obstacles import Obstacles
 from veca_marl.sim.sound.partitions import (
@@ -313,7 +313,7 @@ def _shares(of_source: float, of_head: float) -> tuple[float, float, float]:
     return inside, scale * head, scale * source
 
 
-@compiled
+@kernel
 def nearest_opening(source: Floats, head: Floats, openings: Screens) -> tuple[int, float, float]:
     """Return the opening that one of two points is nearest to within `NEAR_M`, -1 if none is.
 

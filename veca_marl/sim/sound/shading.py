@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import compiled, inlined, kernel
 from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS
 from veca_marl.sim.sound.signal_paths import read_moving
 
@@ -102,7 +102,7 @@ def unshaded(n_paths: int) -> NDArray[np.float32]:
     return sections
 
 
-@compiled
+@kernel
 def is_unity(sections: Sections) -> bool:
     """Return whether sections ``(S, 3)``, see `shelf_filters`, change nothing."""
     for s in range(sections.shape[0]):
@@ -111,7 +111,7 @@ def is_unity(sections: Sections) -> bool:
     return True
 
 
-@compiled
+@kernel
 def shade(
     signal: NDArray[np.float32], before: Sections, after: Sections, state: NDArray[np.float32]
 ) -> None:
@@ -123,30 +123,27 @@ def shade(
         after: ``(S, 3)`` coefficients at the last sample.
         state: ``(S,)`` of the sections; overwritten.
     """
-    per_sample = (after - before) / np.float32(len(signal))
     for s in range(0, len(before), 3):
-        _shade_three(signal, before[s : s + 3], per_sample[s : s + 3], state[s : s + 3])
+        _shade_three(signal, before[s : s + 3], after[s : s + 3], state[s : s + 3])
 
 
-@compiled
+@kernel
 def _shade_three(
-    signal: NDArray[np.float32], before: Sections, slope: Sections, state: NDArray[np.float32]
+    signal: NDArray[np.float32], before: Sections, after: Sections, state: NDArray[np.float32]
 ) -> None:
     """Filter a signal by three sections at once: their recursions overlap in time.
 
     Args:
         signal: See `shade`.
         before: ``(3, 3)`` coefficients before the first sample.
-        slope: ``(3, 3)`` by which they change per sample.
+        after: ``(3, 3)`` coefficients at the last sample.
         state: ``(3,)``, overwritten.
     """
-    b0, b1, a1 = before[0]
-    c0, c1, d1 = before[1]
-    e0, e1, f1 = before[2]
-    db0, db1, da1 = slope[0]
-    dc0, dc1, dd1 = slope[1]
-    de0, de1, df1 = slope[2]
-    r, s, t = state
+    n = np.float32(len(signal))
+    b0, b1, a1, db0, db1, da1 = _line(before[0], after[0], n)
+    c0, c1, d1, dc0, dc1, dd1 = _line(before[1], after[1], n)
+    e0, e1, f1, de0, de1, df1 = _line(before[2], after[2], n)
+    r, s, t = state[0], state[1], state[2]
     for i in range(len(signal)):
         b0, b1, a1 = b0 + db0, b1 + db1, a1 + da1
         c0, c1, d1 = c0 + dc0, c1 + dc1, d1 + dd1
@@ -162,7 +159,16 @@ def _shade_three(
     state[0], state[1], state[2] = r, s, t
 
 
-@compiled
+@inlined
+def _line(
+    before: NDArray[np.float32], after: NDArray[np.float32], n: np.float32
+) -> tuple[float, float, float, float, float, float]:
+    """Return three coefficients ``(3,)`` and by how much each changes in one of n samples."""
+    b0, b1, a1 = before[0], before[1], before[2]
+    return b0, b1, a1, (after[0] - b0) / n, (after[1] - b1) / n, (after[2] - a1) / n
+
+
+@kernel
 def read_shaded_block(
     powers: NDArray[np.float32],
     start: int,
@@ -197,8 +203,9 @@ def read_shaded_block(
         if unchanged:
             states[k] = np.float32(0.0)
         for channel in range(signals.shape[1]):
-            signal = signals[k, channel]
-            signal[:kept] = ends[k, channel, :kept]
+            signal, last = signals[k, channel], ends[k, channel]
+            for i in range(kept):
+                signal[i] = last[i]
             new = signal[kept:]
             if silent:
                 new[:] = np.float32(0.0)
@@ -206,7 +213,9 @@ def read_shaded_block(
                 read_moving(powers, start, end, before[k, channel], after[k, channel], new)
             if not unchanged:
                 shade(new, sections[0][k], sections[1][k], states[k, channel])
-    ends[:] = signals[:, :, signals.shape[2] - ends.shape[2] :]
+            first = signal.shape[0] - last.shape[0]
+            for i in range(last.shape[0]):
+                last[i] = signal[first + i]
 
 
 @compiled

@@ -18,7 +18,7 @@ from veca_marl.sim.geometry import (
     bounding_radius,
     distance,
 )
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 from veca_marl.sim.touch.taxels import TaxelTable
 
 _POLYHEDRON = int(Shape.POLYHEDRON)
@@ -27,7 +27,7 @@ _POLYHEDRON = int(Shape.POLYHEDRON)
 PlacedPrimitive: TypeAlias = tuple[int, Vector, Vector, Vector, Vector, Vector]
 
 
-@compiled
+@kernel
 def bounding_spheres(taxels: TaxelTable, vertices: Floats, patches: Floats, bones: Floats) -> None:
     """Compute spheres that contain all sensing points, for any pose of the joints.
 
@@ -58,7 +58,7 @@ def bounding_spheres(taxels: TaxelTable, vertices: Floats, patches: Floats, bone
     _enclose(bones, 0, whole, bones, whole)
 
 
-@compiled
+@kernel
 def _enclose(spheres: Floats, first: int, end: int, out: Floats, row: int) -> None:
     """Write to a row a sphere that contains the spheres `first` to `end` - 1."""
     out[row] = 0.0
@@ -73,7 +73,7 @@ def _enclose(spheres: Floats, first: int, end: int, out: Floats, row: int) -> No
     out[row, 3] = radius
 
 
-@compiled
+@kernel
 def find_candidates(
     geoms: GeomTable,
     ignored: Bools,
@@ -93,7 +93,9 @@ def find_candidates(
         candidates: ``(B, G)``, written.
     """
     whole = bones.shape[0] - 1
-    thickest = thickness.max()
+    thickest = 0.0
+    for bone in range(whole):
+        thickest = max(thickest, thickness[bone])
     candidates[:] = False
     for g in range(candidates.shape[1]):
         size, skin = bounding_radius(geoms.shapes[g], geoms.sizes[g]), geoms.skins[g]

@@ -23,7 +23,7 @@ from veca_marl.sim.geometry import (
     solid_entry,
     solid_gradient,
 )
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 from veca_marl.sim.touch.rigid_bones import distance_to_placed, moved_to_height, shrunk
 
 _BOX, _CYLINDER = int(Shape.BOX), int(Shape.CYLINDER)
@@ -89,7 +89,7 @@ def pressing_entry(pressing: PressingSolid, point: Vector, way: Vector, reach: f
     return float(solid_entry(pressing.core, point, way))
 
 
-@compiled
+@kernel
 def _traced_entry(pressing: PressingSolid, point: Vector, way: Vector, reach: float) -> float:
     """Follow a ray by its distance from the solid (sphere tracing; Hart, Visual Computer 1996)."""
     (x, y, z), (u, v, w) = point, way
@@ -151,7 +151,7 @@ def taxel_reading(
     return known
 
 
-@compiled
+@kernel
 def _reading_around(
     column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, away: float
 ) -> float:
@@ -183,7 +183,7 @@ def _pressed_share(column: Column, placed: Floats, x: float, y: float, z: float)
     return min(max(1.0 - height / column.length, 0.0), 1.0)
 
 
-@compiled
+@kernel
 def _column_reading(
     column: Column, placed: Floats, base: Vector, normal: Vector, known: float
 ) -> float:
@@ -202,7 +202,7 @@ def _column_reading(
     return max(min(share, _pressed_share(column, placed, x, y, z)), known)
 
 
-@compiled
+@kernel
 def _field_reading(
     column: Column, placed: Floats, base: Vector, normal: Vector, radius: float, known: float
 ) -> float:

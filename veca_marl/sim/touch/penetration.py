@@ -45,7 +45,7 @@ from veca_marl.sim.geometry import (
     Vector,
     solid_of,
 )
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 from veca_marl.sim.touch.broad_phase import (
     PlacedPrimitive,
     bounding_spheres,
@@ -122,7 +122,7 @@ def read_taxels(
         measure_penetration(taxels, fields, vertices, geoms, geoms.faces, own, workspace, readings)
 
 
-@compiled
+@kernel
 def _read_all_but_polyhedra(
     taxels: TaxelTable,
     fields: Fields,
@@ -142,7 +142,7 @@ def _read_all_but_polyhedra(
     measure_penetration(taxels, fields, vertices, geoms, None, own, workspace, readings)
 
 
-@compiled
+@kernel
 def measure_penetration(
     taxels: TaxelTable,
     fields: Fields,
@@ -195,7 +195,7 @@ def measure_penetration(
                 )
 
 
-@compiled
+@kernel
 def _sensed_primitive(geoms: GeomTable, g: int, kept: float) -> tuple[PlacedPrimitive, float]:
     """Return a row of the table as scalars, its core alone, and the layer of `PressingSolid`.
 

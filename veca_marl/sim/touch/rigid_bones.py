@@ -17,7 +17,7 @@ from veca_marl.sim.geometry import (
     distance,
     distance_and_gradient,
 )
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 
 _SPHERE, _BOX = int(Shape.SPHERE), int(Shape.BOX)
 _CYLINDER, _CAPSULE = int(Shape.CYLINDER), int(Shape.CAPSULE)
@@ -71,7 +71,7 @@ def shrunk(shape: int, size: Vector, by: float) -> Vector:
     return size[0] - by, size[1], 0.0
 
 
-@compiled
+@kernel
 def place_bone(
     geoms: GeomTable, bones: RigidBones, bone: int, rotation: Floats, origin: Floats
 ) -> int:
@@ -114,7 +114,7 @@ def distance_to_placed(placed: Floats, count: int, x: float, y: float, z: float)
     return nearest
 
 
-@compiled
+@kernel
 def is_farther(shape: int, size: Vector, placed: Floats, count: int, reach: float) -> bool:
     """Return whether a primitive is certainly farther than `reach` from the placed ones.
 
@@ -148,7 +148,7 @@ def is_farther(shape: int, size: Vector, placed: Floats, count: int, reach: floa
     return True
 
 
-@compiled
+@kernel
 def moved_to_height(placed: Floats, count: int, point: Vector, height: float) -> Vector:
     """Return a point moved along the gradient of the distance from a bone to a given distance.
 

@@ -26,7 +26,7 @@ from veca_marl.sim.geometry import (
     single,
 )
 from veca_marl.sim.geometry.polyhedra import limited_distance
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import compiled, inlined, kernel
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
@@ -71,7 +71,23 @@ def darken_contact_shadows(
         surfaces: ``(H, W)`` indices of the visible surfaces.
         lights: ``(H, W)`` brightness of each pixel, multiplied in place.
     """
-    nearness, any_near = np.zeros_like(lights), False
+    nearness = np.zeros_like(lights)
+    _darken(geoms, casting, view, lens, depth, surfaces, nearness, lights)
+
+
+@kernel
+def _darken(
+    geoms: GeomTable,
+    casting: Bools,
+    view: Floats,
+    lens: Lens,
+    depth: Depths,
+    surfaces: Surfaces,
+    nearness: NDArray[np.float32],
+    lights: NDArray[np.float32],
+) -> None:
+    """See `darken_contact_shadows`; `nearness` is 0, and overwritten by that of all primitives."""
+    any_near = False
     for g in range(geoms.shapes.shape[0]):
         radius = bounding_radius(geoms.shapes[g], geoms.sizes[g])
         reach, height = radius + REACH_M, geoms.positions[g, 2]
@@ -89,7 +105,7 @@ def darken_contact_shadows(
             lights[j, i] *= single(1.0 - DARKNESS * nearness[j, i] * nearness[j, i])
 
 
-@compiled
+@kernel
 def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) -> Rectangle:
     """Return the pixels that may show a square of the floor below a point."""
     ex, ey, ez = position[0] - view[0, 0], position[1] - view[0, 1], -view[0, 2]
@@ -106,7 +122,7 @@ def _floor_rectangle(position: Floats, around: float, view: Floats, lens: Lens) 
     return pixel_rectangle(across, upward, lens)
 
 
-@compiled
+@kernel
 def _approach(
     geoms: GeomTable,
     g: int,
@@ -171,7 +187,7 @@ def _in_frame(frame: Ray, point: Vector) -> Vector:
     )
 
 
-@compiled
+@kernel
 def _approach_row_of_faces(
     faces: Floats, size: Vector, frame: Ray, eye: Ray, y: float, name: int, pixels: Pixels
 ) -> None:

@@ -32,7 +32,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.vision.camera import Camera
 from veca_marl.sim.vision.rasterizer import Depths
 from veca_marl.sim.vision.shading import Images
@@ -181,7 +181,7 @@ def _levels(largest_variance: float) -> NDArray[np.float64]:
     return np.concatenate(([0.0], 0.5 * 2.0 ** np.arange(octaves + 1)))
 
 
-@compiled
+@kernel
 def _blend(
     stack: NDArray[np.uint8], variance: Depths, levels: NDArray[np.float64], out: Images
 ) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, Indices, MeshTable, Vector, single
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 from veca_marl.sim.vision.rasterizer import (
     Depths,
     Interval,
@@ -36,7 +36,7 @@ _MARGIN_PX = 0.01  # covers rounding errors of slopes in single precision
 _ROUNDING_M = 1e-4  # depths are stored in single precision
 
 
-@compiled
+@kernel
 def to_camera_frame(vertices: Floats, view: Floats, seen: Floats) -> None:
     """Write vertices ``(V, 3)`` in the camera frame: metres right, up and forward.
 
@@ -53,7 +53,7 @@ def to_camera_frame(vertices: Floats, view: Floats, seen: Floats) -> None:
             seen[v, axis] = view[axis + 1, 0] * x + view[axis + 1, 1] * y + view[axis + 1, 2] * z
 
 
-@compiled
+@kernel
 def draw_triangles(
     triangles: Indices,
     seen: Floats,
@@ -107,7 +107,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-@compiled
+@kernel
 def _rectangle(a: Vector, b: Vector, c: Vector, nearest: float, lens: Lens) -> Rectangle:
     """Return the pixels that a triangle may cover."""
     if nearest <= lens.near:
@@ -141,7 +141,7 @@ def _centres_between(across: Interval, upward: Interval, lens: Lens) -> Rectangl
     )
 
 
-@compiled
+@kernel
 def _cut_rectangle(a: Vector, b: Vector, c: Vector, lens: Lens) -> Rectangle:
     """Return the pixels that a triangle crossing the near plane may cover, most often none.
 
@@ -192,7 +192,7 @@ def _fill(
                 surfaces[j, i] = name
 
 
-@compiled
+@kernel
 def illuminate_triangles(
     meshes: MeshTable,
     seen: Floats,
@@ -244,7 +244,7 @@ def _edge(a: Vector, b: Vector, x: float, y: float) -> float:
     return normal[0] * x + normal[1] * y + normal[2]
 
 
-@compiled
+@kernel
 def draw_meshes(
     meshes: MeshTable,
     drawn: Bools,
@@ -280,7 +280,7 @@ def draw_meshes(
         draw_triangles(triangles, seen, chosen, lens, first_surface + begin, depth, surfaces)
 
 
-@compiled
+@kernel
 def is_occluded(lower: Floats, upper: Floats, view: Floats, lens: Lens, depth: Depths) -> bool:
     """Return whether a box is entirely hidden or outside of the image.
 

@@ -23,14 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, Shape, Vector, bounding_radius, single
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import compiled, kernel
 from veca_marl.sim.vision.row_intersections import (
     box_row,
     capsule_row,
     cylinder_row,
-    heights_above,
     polyhedron_row,
     sphere_row,
+    write_heights,
 )
 
 Interval: TypeAlias = tuple[float, float]
@@ -52,7 +52,7 @@ _POLYHEDRON = int(Shape.POLYHEDRON)
 _HALF = single(0.5)
 
 
-@compiled
+@kernel
 def disc_interval(across: float, forward: float, radius: float, limit: float) -> Interval:
     """Return the slopes of the two tangents from the camera to a disc, cut to [-limit, limit].
 
@@ -77,7 +77,7 @@ def disc_interval(across: float, forward: float, radius: float, limit: float) ->
     return (edge, limit) if across > 0.0 else (-limit, -edge)
 
 
-@compiled
+@kernel
 def _forward_tangent(across: float, forward: float, radius: float) -> float:
     """Return the slope of the tangent to a disc beside the camera, on the optical axis' side."""
     angle = math.atan2(across, forward)
@@ -85,7 +85,7 @@ def _forward_tangent(across: float, forward: float, radius: float) -> float:
     return math.tan(angle) if angle < _GRAZING_RAD else math.inf
 
 
-@compiled
+@kernel
 def rod_interval(
     across: float,
     forward: float,
@@ -109,7 +109,7 @@ def rod_interval(
     return min(low, other_low), max(high, other_high)
 
 
-@compiled
+@kernel
 def box_intervals(
     centre: Vector, half: Vector, right: Vector, up: Vector, forward: Vector, near: float
 ) -> tuple[Interval, Interval]:
@@ -160,7 +160,7 @@ def box_intervals(
     return (low_x, high_x), (low_y, high_y)
 
 
-@compiled
+@kernel
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -207,6 +207,22 @@ def draw_geoms(
         depth: ``(H, W)`` metres along the optical axis, updated where a nearer surface is hit.
         surfaces: ``(H, W)`` row of the visible primitive, updated likewise.
     """
+    heights = np.empty(len(geoms.faces))
+    _draw_geoms(geoms, drawn, view, lens, bounded, heights, depth, surfaces)
+
+
+@kernel
+def _draw_geoms(
+    geoms: GeomTable,
+    drawn: Bools,
+    view: Floats,
+    lens: Lens,
+    bounded: bool,
+    heights: Floats,
+    depth: Depths,
+    surfaces: Surfaces,
+) -> None:
+    """See `draw_geoms`; `heights` is overwritten, see `draw_polyhedron`."""
     for g in range(geoms.shapes.shape[0]):
         if not drawn[g]:
             continue
@@ -219,7 +235,15 @@ def draw_geoms(
         if geoms.shapes[g] == _POLYHEDRON:
             first_face = int(geoms.sizes[g, 0])
             draw_polyhedron(
-                geoms.faces, first_face, ray, rectangle, lens, np.int16(g), depth, surfaces
+                geoms.faces,
+                first_face,
+                heights,
+                ray,
+                rectangle,
+                lens,
+                np.int16(g),
+                depth,
+                surfaces,
             )
         else:
             draw_rectangle(
@@ -227,7 +251,7 @@ def draw_geoms(
             )
 
 
-@compiled
+@kernel
 def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
     """Return camera position and right, up and forward axes in a primitive's own axes."""
     return (
@@ -240,7 +264,7 @@ def local_ray(position: Floats, rotation: Floats, view: Floats) -> Ray:
     )
 
 
-@compiled
+@kernel
 def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
     """Return a world vector in local axes, in single precision."""
     return (
@@ -250,7 +274,7 @@ def into_local(rotation: Floats, x: float, y: float, z: float) -> Vector:
     )
 
 
-@compiled
+@kernel
 def bounding_rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Lens) -> Rectangle:
     """Return pixels (first column, last + 1, first row, last + 1) that a primitive may cover."""
     eye, right, up, forward = ray
@@ -281,7 +305,7 @@ def bounding_rectangle(shape: int, size: NDArray[np.float32], ray: Ray, lens: Le
     return pixel_rectangle(across, upward, lens)
 
 
-@compiled
+@kernel
 def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle:
     """Return the pixels with centres between two pairs of slopes; empty outside of the image."""
     left, right = max(across[0], -lens.tan_x), min(across[1], lens.tan_x)
@@ -299,7 +323,7 @@ def pixel_rectangle(across: Interval, upward: Interval, lens: Lens) -> Rectangle
     )
 
 
-@compiled
+@kernel
 def draw_rectangle(
     shape: int,
     size: NDArray[np.float32],
@@ -336,10 +360,11 @@ def draw_rectangle(
             capsule_row(size[0], half_length, eye, start, right, columns, near, surface, row, names)
 
 
-@compiled
+@kernel
 def draw_polyhedron(
     faces: Floats,
     first_face: int,
+    heights: Floats,
     ray: Ray,
     rectangle: Rectangle,
     lens: Lens,
@@ -347,13 +372,18 @@ def draw_polyhedron(
     depth: Depths,
     surfaces: Surfaces,
 ) -> None:
-    """Intersect the rays of a rectangle with one polyhedron and update the buffers."""
+    """Intersect the rays of a rectangle with one polyhedron and update the buffers.
+
+    `heights` is overwritten: ``(P,)`` for at least as many planes as the polyhedron has.
+    """
     eye, right, up, forward = ray
     first, end, top, bottom = rectangle
     columns, near = lens.columns[first:end], lens.near
-    heights = heights_above(faces, first_face, eye)
+    count = write_heights(faces, first_face, eye, heights)
     for j in range(top, bottom):
         y = lens.rows[j]
         start = (forward[0] + y * up[0], forward[1] + y * up[1], forward[2] + y * up[2])
         row, names = depth[j, first:end], surfaces[j, first:end]
-        polyhedron_row(faces, first_face, heights, start, right, columns, near, surface, row, names)
+        polyhedron_row(
+            faces, first_face, heights[:count], start, right, columns, near, surface, row, names
+        )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Bools, Floats, GeomTable, MeshTable, Shape, SurfaceTable
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import compiled, kernel
 from veca_marl.sim.vision.contact_shadows import darken_contact_shadows
 from veca_marl.sim.vision.mesh_rasterizer import draw_meshes, illuminate_triangles
 from veca_marl.sim.vision.rasterizer import (
@@ -79,7 +79,8 @@ def collect_layers(
         first, end, top, bottom = rectangle
         if first < end and top < bottom and shape == _POLYHEDRON:
             faces, row = geoms.faces, int(size[0])
-            draw_polyhedron(faces, row, ray, rectangle, lens, surface, scratch, hit)
+            heights = np.empty(len(faces))
+            draw_polyhedron(faces, row, heights, ray, rectangle, lens, surface, scratch, hit)
         elif first < end and top < bottom:
             draw_rectangle(shape, size, ray, rectangle, lens, surface, scratch, hit)
         for j in range(top, bottom):
@@ -105,7 +106,7 @@ def _layers(count: int, size: tuple[int, int]) -> tuple[Depths, Surfaces]:
     )
 
 
-@compiled
+@kernel
 def _insert(
     depths: Depths, surfaces: Surfaces, j: int, i: int, surface: np.int16, t: np.float32
 ) -> tuple[np.int16, np.float32]:

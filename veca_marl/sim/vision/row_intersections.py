@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry.polyhedra import PLANES_COLUMN
 from veca_marl.sim.geometry.poses import Floats, Vector, single
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 
 Depths = NDArray[np.float32]
 Surfaces = NDArray[np.int16]
@@ -37,7 +37,7 @@ _PARALLEL = 1e-12
 _FAR_M = 1e9
 
 
-@compiled
+@kernel
 def sphere_row(
     radius: float,
     eye: Vector,
@@ -70,7 +70,7 @@ def sphere_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@compiled
+@kernel
 def box_row(
     half: Vector,
     eye: Vector,
@@ -100,7 +100,7 @@ def box_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@compiled
+@kernel
 def cylinder_row(
     radius: float,
     half_length: float,
@@ -134,7 +134,7 @@ def cylinder_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@compiled
+@kernel
 def capsule_row(
     radius: float,
     half_length: float,
@@ -176,18 +176,21 @@ def capsule_row(
         surfaces[i] = surface if hit else surfaces[i]
 
 
-@compiled
-def heights_above(faces: Floats, first: int, eye: Vector) -> Floats:
-    """Return the distances ``(P,)`` of a point from the planes of a polyhedron, see `face_rows`."""
+@kernel
+def write_heights(faces: Floats, first: int, eye: Vector, heights: Floats) -> int:
+    """Write the distances of a point from the planes of a polyhedron, see `face_rows`.
+
+    Returns:
+        How many planes these are; the rest of `heights` is not written.
+    """
     (ox, oy, oz), count = eye, int(faces[first, _PLANES])
-    heights = np.empty(count)
     for k in range(count):
         f = first + k
         heights[k] = faces[f, 0] * ox + faces[f, 1] * oy + faces[f, 2] * oz - faces[f, 3]
-    return heights
+    return count
 
 
-@compiled
+@kernel
 def polyhedron_row(
     faces: Floats,
     first: int,
@@ -203,7 +206,7 @@ def polyhedron_row(
     """Intersect a row of rays with the half spaces below the planes of all faces.
 
     The polyhedron is that with the row `first` in the table of faces, and `heights` are those of
-    the origin of the rays, see `heights_above`. A ray is done as soon as it leaves before it
+    the origin of the rays, see `write_heights`. A ray is done as soon as it leaves before it
     enters, or enters behind what is drawn already.
     """
     (sx, sy, sz), (rx, ry, rz) = start, right

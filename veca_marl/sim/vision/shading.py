@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.geometry import Floats, GeomTable, Shape, Vector, single
 from veca_marl.sim.geometry.polyhedra import nearest_plane
-from veca_marl.sim.kernels import compiled, inlined
+from veca_marl.sim.kernels import inlined, kernel
 from veca_marl.sim.vision.rasterizer import (
     NO_SURFACE,
     Depths,
@@ -49,7 +49,7 @@ _TILE_SHIFT = 0.01
 _POLYHEDRON = int(Shape.POLYHEDRON)
 
 
-@compiled
+@kernel
 def colour_planes(
     lens: Lens, colours: Lights, surfaces: Surfaces, lights: Lights, planes: Images
 ) -> None:
@@ -81,14 +81,14 @@ def colour_planes(
                     _colour_run(colours[g, c], lights[j, first:end], run)
 
 
-@compiled
+@kernel
 def _colour_run(colour: float, lights: Lights, run: Images) -> None:
     """Write one plane of the lit colour of a surface along a run of pixels."""
     for i in range(run.shape[0]):
         run[i] = np.uint8(np.int32(min(_255 * lights[i] * colour, _255) + _HALF))
 
 
-@compiled
+@kernel
 def blend_colours(
     colours: Lights, surfaces: Surfaces, lights: Lights, opacity: float, planes: Images
 ) -> None:
@@ -113,7 +113,7 @@ def blend_colours(
                 planes[c, j, i] = np.uint8(min(mixed, _255) + _HALF)
 
 
-@compiled
+@kernel
 def illuminate(
     geoms: GeomTable, view: Floats, lens: Lens, depth: Depths, surfaces: Surfaces, lights: Lights
 ) -> None:
@@ -170,7 +170,7 @@ def _brightness(facing: float) -> float:
     return _AMBIENT + _DIRECT * max(facing, _0) + _BOUNCE * max(-facing, _0)
 
 
-@compiled
+@kernel
 def _light_box(
     size: Lights,
     ray: Ray,
@@ -199,7 +199,7 @@ def _light_box(
         lights[i] = along_x if ax >= max(ay, az) else not_x
 
 
-@compiled
+@kernel
 def _light_run(
     shape: int,
     size: Lights,
@@ -224,7 +224,7 @@ def _light_run(
         lights[i] = _brightness(normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2])
 
 
-@compiled
+@kernel
 def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
     """Return the outward unit normal at a point of a round primitive, in its own axes."""
     x, y, z = point
@@ -242,7 +242,7 @@ def _local_normal(shape: int, size: Lights, point: Vector) -> Vector:
     return x / radius, y / radius, (z - along) / radius
 
 
-@compiled
+@kernel
 def frame_ray(geoms: GeomTable, g: int, view: Floats) -> FrameRay:
     """Return camera position, right, up and forward axes in the frame that a primitive is on."""
     rotation, local = geoms.rotations[g], geoms.local_rotations[g]
@@ -262,7 +262,7 @@ def frame_ray(geoms: GeomTable, g: int, view: Floats) -> FrameRay:
     )
 
 
-@compiled
+@kernel
 def tile_run(
     ray: FrameRay, y: float, columns: Depths, depth: Depths, edge_m: float, lights: Lights
 ) -> None:
@@ -278,7 +278,7 @@ def tile_run(
             lights[i] *= single(DARK_TILE)
 
 
-@compiled
+@kernel
 def _into_frame(rotation: Floats, local: Floats, x: float, y: float, z: float) -> Point:
     """Return a world vector in the axes of the frame that a primitive is on.
 
@@ -299,7 +299,7 @@ def _into_frame(rotation: Floats, local: Floats, x: float, y: float, z: float) -
     )
 
 
-@compiled
+@kernel
 def to_object_ids(objects: Surfaces, surfaces: Surfaces) -> None:
     """Replace surface indices by object ids, in place; `NO_SURFACE` is kept."""
     for j in range(surfaces.shape[0]):
@@ -308,7 +308,7 @@ def to_object_ids(objects: Surfaces, surfaces: Surfaces) -> None:
                 surfaces[j, i] = objects[surfaces[j, i]]
 
 
-@compiled
+@kernel
 def illuminate_polyhedra(
     geoms: GeomTable,
     view: Floats,
@@ -345,7 +345,7 @@ def illuminate_polyhedra(
                 tile_run(ray, lens.rows[j], columns, run, geoms.checkers[g], lit)
 
 
-@compiled
+@kernel
 def _light_faces(
     geoms: GeomTable,
     g: int,

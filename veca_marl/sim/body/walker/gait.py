@@ -18,7 +18,7 @@ import numpy as np
 from veca_marl.sim.body.anatomy import Growth, Skeleton
 from veca_marl.sim.body.walker.neck import Neck
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 
 _STANCE = 0.5  # fraction of the stride in which a foot is on the floor
 
@@ -156,7 +156,7 @@ class Stride(NamedTuple):
     stance_s: float
 
 
-@compiled
+@kernel
 def write_stride(angles: Floats, stride: Stride, cfg: GaitCfg, legs: Legs) -> None:
     """Write the angles of legs and arms, each arm in opposition to the leg of its side.
 
@@ -183,7 +183,7 @@ def write_stride(angles: Floats, stride: Stride, cfg: GaitCfg, legs: Legs) -> No
         angles[legs.elbow[side]] = cfg.elbow_rad
 
 
-@compiled
+@kernel
 def _foothold(
     stride: Stride, cfg: GaitCfg, hip_y_m: float, time_s: float
 ) -> tuple[float, float, float]:
@@ -206,7 +206,7 @@ def _foothold(
     return c * x + s * y, c * y - s * x - hip_y_m, -turned
 
 
-@compiled
+@kernel
 def place_foot(
     angles: Floats,
     side: int,
@@ -361,7 +361,7 @@ class Gait:
         self.angles[self._legs.foot[1]] = _KICK_TOES_RAD * (1.0 - done)
 
 
-@compiled
+@kernel
 def clip(angles: Floats, low: Floats, high: Floats) -> None:
     """Clip angles ``(n,)`` to their limits ``(n,)`` in place."""
     for i in range(len(angles)):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from veca_marl.sim.body.anatomy import Skeleton
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 
 _ROUNDING_RAD = 1e-9
 
@@ -74,7 +74,7 @@ class Neck:
         _distribute(angles, bends, self._pairs, self._low, self._high)
 
 
-@compiled
+@kernel
 def _distribute(
     angles: Floats,
     bends: tuple[float, float, float],

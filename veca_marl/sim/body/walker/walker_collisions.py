@@ -21,7 +21,7 @@ import numpy as np
 
 from veca_marl.sim.body.walker.actions import VerbUser, apply_verbs
 from veca_marl.sim.geometry import Floats
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import compiled, kernel
 from veca_marl.sim.physics import World
 
 _TOLERANCE_M = 1e-7
@@ -84,7 +84,7 @@ def _overlap_counts(positions: Floats, half_axes: Floats, radii: Floats) -> Floa
     return counts
 
 
-@compiled
+@kernel
 def _overlap(
     positions: Floats, half_axes: Floats, radii: Floats, i: int, j: int
 ) -> tuple[float, float, float, float]:
@@ -105,7 +105,7 @@ def _overlap(
     return dx, dy, distance, width - distance
 
 
-@compiled
+@kernel
 def _cross(dx: float, dy: float, one: Floats, other: Floats) -> bool:
     """Return whether two axes cross; points cross where they coincide.
 
@@ -124,7 +124,7 @@ def _cross(dx: float, dy: float, one: Floats, other: Floats) -> bool:
     return bool(abs(along_one) <= 1.0 and abs(along_other) <= 1.0)
 
 
-@compiled
+@kernel
 def _nearest(dx: float, dy: float, one: Floats, other: Floats) -> tuple[float, float]:
     """Return the shortest vector from the other axis to the one, which do not cross; see `_cross`.
 
@@ -148,7 +148,7 @@ def _nearest(dx: float, dy: float, one: Floats, other: Floats) -> tuple[float, f
     return best_x, best_y
 
 
-@compiled
+@kernel
 def _share(x: float, y: float, half_axis: Floats) -> float:
     """Return the place on an axis nearest to a point relative to its centre, in [-1, 1]."""
     squared = half_axis[0] * half_axis[0] + half_axis[1] * half_axis[1]
