@@ -75,6 +75,12 @@ def _length(vector: Floats) -> float:
 
 
 @kernel
+def _distance(one: Floats, other: Floats) -> float:
+    x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    return float(np.sqrt(x**2 + y**2 + z**2))
+
+
+@kernel
 def omnidirectional_paths(
     arrivals: Floats,
     gains: Floats,
@@ -97,7 +103,7 @@ def omnidirectional_paths(
     """
     for k in range(arrivals.shape[0]):
         for ear in range(ears.shape[0]):
-            distance = _length(arrivals[k] - ears[ear])
+            distance = _distance(arrivals[k], ears[ear])
             delays[k, ear] = distance * samples_per_metre
             filters[k, ear, 0] = np.float32(gains[k] / max(distance, nearest_m))
 
