@@ -20,7 +20,13 @@ from veca_marl.sim.sound.shading import (
     shelf_filters,
     unshaded,
 )
-from veca_marl.sim.sound.signal_paths import KERNEL_TAPS, Mixer, SignalMemory, read_moving
+from veca_marl.sim.sound.signal_paths import (
+    KERNEL_TAPS,
+    Mixer,
+    SignalMemory,
+    copy_samples,
+    read_moving,
+)
 from veca_marl.sim.sound.sounds import Source
 from veca_marl.sim.sound.surroundings import Arrivals, Surroundings
 
@@ -367,10 +373,7 @@ def read_block(
     for k in range(signals.shape[0]):
         for channel in range(signals.shape[1]):
             signal, last = signals[k, channel], ends[k, channel]
-            for i in range(kept):
-                signal[i] = last[i]
+            copy_samples(last, signal[:kept])
             new = signal[kept:]
             read_moving(powers, start, end, before[k, channel], after[k, channel], new)
-            first = signal.shape[0] - last.shape[0]
-            for i in range(last.shape[0]):
-                last[i] = signal[first + i]
+            copy_samples(signal[signal.shape[0] - last.shape[0] :], last)

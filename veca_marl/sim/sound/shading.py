@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from veca_marl.sim.geometry import Floats
 from veca_marl.sim.kernels import compiled, inlined, kernel
 from veca_marl.sim.sound.partitions import BANDS_HZ, N_BANDS
-from veca_marl.sim.sound.signal_paths import read_moving
+from veca_marl.sim.sound.signal_paths import copy_samples, read_moving
 
 SETTLING_SAMPLES = 512
 """After so many samples what a filter has not heard of the past is below -80 dB."""
@@ -140,9 +140,9 @@ def _shade_three(
         state: ``(3,)``, overwritten.
     """
     n = np.float32(len(signal))
-    b0, b1, a1, db0, db1, da1 = _line(before[0], after[0], n)
-    c0, c1, d1, dc0, dc1, dd1 = _line(before[1], after[1], n)
-    e0, e1, f1, de0, de1, df1 = _line(before[2], after[2], n)
+    b0, b1, a1, db0, db1, da1 = _ramp(before[0], after[0], n)
+    c0, c1, d1, dc0, dc1, dd1 = _ramp(before[1], after[1], n)
+    e0, e1, f1, de0, de1, df1 = _ramp(before[2], after[2], n)
     r, s, t = state[0], state[1], state[2]
     for i in range(len(signal)):
         b0, b1, a1 = b0 + db0, b1 + db1, a1 + da1
@@ -160,10 +160,10 @@ def _shade_three(
 
 
 @inlined
-def _line(
+def _ramp(
     before: NDArray[np.float32], after: NDArray[np.float32], n: np.float32
 ) -> tuple[float, float, float, float, float, float]:
-    """Return three coefficients ``(3,)`` and by how much each changes in one of n samples."""
+    """Return three coefficients ``(3,)`` and by how much each changes per sample of n."""
     b0, b1, a1 = before[0], before[1], before[2]
     return b0, b1, a1, (after[0] - b0) / n, (after[1] - b1) / n, (after[2] - a1) / n
 
@@ -204,8 +204,7 @@ def read_shaded_block(
             states[k] = np.float32(0.0)
         for channel in range(signals.shape[1]):
             signal, last = signals[k, channel], ends[k, channel]
-            for i in range(kept):
-                signal[i] = last[i]
+            copy_samples(last, signal[:kept])
             new = signal[kept:]
             if silent:
                 new[:] = np.float32(0.0)
@@ -213,9 +212,7 @@ def read_shaded_block(
                 read_moving(powers, start, end, before[k, channel], after[k, channel], new)
             if not unchanged:
                 shade(new, sections[0][k], sections[1][k], states[k, channel])
-            first = signal.shape[0] - last.shape[0]
-            for i in range(last.shape[0]):
-                last[i] = signal[first + i]
+            copy_samples(signal[signal.shape[0] - last.shape[0] :], last)
 
 
 @compiled

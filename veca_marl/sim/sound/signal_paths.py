@@ -149,6 +149,13 @@ def read_moving(
         i += run
 
 
+@kernel
+def copy_samples(samples: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Copy the first ``len(out)`` samples; the assignment of a slice would create an array."""
+    for i in range(out.shape[0]):
+        out[i] = samples[i]
+
+
 class SignalMemory:
     """The last samples of a signal. Reads are late by `HALF_WIDTH` samples.
 

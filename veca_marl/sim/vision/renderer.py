@@ -70,6 +70,7 @@ def collect_layers(
     scratch = depth.copy()
     hit = np.full(depth.shape, NO_SURFACE, np.int16)
     depths, surfaces = _layers(0, depth.shape)
+    heights = np.empty(len(geoms.faces))  # see `draw_polyhedron`
     for g in range(geoms.shapes.shape[0]):
         if not drawn[g]:
             continue
@@ -79,7 +80,6 @@ def collect_layers(
         first, end, top, bottom = rectangle
         if first < end and top < bottom and shape == _POLYHEDRON:
             faces, row = geoms.faces, int(size[0])
-            heights = np.empty(len(faces))
             draw_polyhedron(faces, row, heights, ray, rectangle, lens, surface, scratch, hit)
         elif first < end and top < bottom:
             draw_rectangle(shape, size, ray, rectangle, lens, surface, scratch, hit)
