@@ -1,5 +1,6 @@
 """One message per process, only when a kernel of this package is compiled."""
 
+import gc
 import re
 import sys
 from functools import cache
@@ -38,6 +39,16 @@ def test_progress_says_how_many_are_done_and_left():
     assert len(told) == 3
     first, second = (re.findall(r"\d+", line) for line in told[1:])
     assert (first[0], second[0]) == ("1", "2")
+
+
+def test_no_garbage_is_collected_meanwhile():
+    collecting = []
+    notice = CompilationNotice([].append)
+    notice.begin = lambda: collecting.append(gc.isenabled())
+    with install_listener("numba:compile", notice):
+        compile_new_kernel("veca_marl.sim.one")
+    assert collecting == [False]
+    assert gc.isenabled()
 
 
 def test_kernels_that_are_compiled_are_not_left(monkeypatch):

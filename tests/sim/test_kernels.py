@@ -55,6 +55,24 @@ def test_what_kernels_call_counts_no_references_either():
         assert not wrong, f"{function.py_func.__name__} calls {wrong}"
 
 
+@kernel
+def next_number(n: int) -> int:
+    return n + 1
+
+
+@kernel
+def count_up(steps: int) -> int:
+    count = next_number(0)
+    for _ in range(steps):
+        count = next_number(count)
+    return count
+
+
+def test_what_kernels_call_is_compiled_once_for_all_values():
+    assert count_up(4) == next_number(4) == 5
+    assert len(next_number.signatures) == 1
+
+
 def returns_an_array(x: Floats) -> Floats:
     return x
 

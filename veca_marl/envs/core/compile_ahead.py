@@ -8,6 +8,7 @@ workers have compiled meanwhile.
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import pickle
@@ -97,5 +98,6 @@ def play_in_another_order(cfg: GameCfg, number: int) -> None:
 
 
 if __name__ == "__main__":
+    gc.disable()  # as in `CompilationNotice`
     chosen_number, chosen_cfg = pickle.load(sys.stdin.buffer)
     play_in_another_order(chosen_cfg, chosen_number)

@@ -254,5 +254,7 @@ def with_glass(
         all_glass = np.concatenate((all_glass, more))
     for layer in range(count):
         to_object_ids(objects, layers[layer])
-        all_glass[layer, v] = layers[layer]
+        for j in range(size[2]):  # the assignment of an array takes 2 s more to compile
+            for i in range(size[3]):
+                all_glass[layer, v, j, i] = layers[layer, j, i]
     return all_glass

@@ -17,7 +17,7 @@ from veca_marl.sim.geometry import (
     quaternions_to_matrices,
     rotation_about_vertical,
 )
-from veca_marl.sim.kernels import compiled
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.physics.bullet import are_in_contact
 from veca_marl.sim.physics.bullet_client import BulletClient, Quaternion, Vector
 from veca_marl.sim.physics.props.geoms import (
@@ -386,8 +386,8 @@ def _copy_poses(props: Sequence[Prop], poses: Sequence[tuple[Vector, Quaternion]
     positions, rotations = props[0]._scene.positions, props[0]._scene.rotations
     numbers = np.array([(*centre, *orientation) for centre, orientation in poses])
     rows = np.array([prop.row for prop in props])
-    valid = _write_poses(numbers, rows, positions, rotations)
-    if not valid.all():
+    valid = np.empty(len(rows), np.bool_)
+    if not _write_poses(numbers, rows, positions, rotations, valid):
         return [prop.name for prop, good in zip(props, valid, strict=True) if not good]
     for prop, pose in zip(props, poses, strict=True):
         row = prop.row
@@ -407,11 +407,15 @@ def _copy_poses(props: Sequence[Prop], poses: Sequence[tuple[Vector, Quaternion]
     return []
 
 
-@compiled
+@kernel
 def _write_poses(
-    poses: Floats, rows: NDArray[np.int64], positions: Floats, rotations: Floats
-) -> NDArray[np.bool_]:
-    """Write poses into a scene if all are valid; return which are, ``(n,)``.
+    poses: Floats,
+    rows: NDArray[np.int64],
+    positions: Floats,
+    rotations: Floats,
+    valid: NDArray[np.bool_],
+) -> bool:
+    """Write poses into a scene if all are valid; return whether they are.
 
     Args:
         poses: ``(n, 7)`` positions in metres and quaternions (x, y, z, w); not finite or far away
@@ -419,18 +423,25 @@ def _write_poses(
         rows: ``(n,)`` their frames.
         positions: ``(F, 3)`` metres, of all frames; written.
         rotations: ``(F, 3, 3)``, likewise.
+        valid: ``(n,)`` which of the poses are; written.
     """
-    valid = np.empty(len(rows), np.bool_)
+    all_valid = True
     for n in range(len(rows)):
-        near = np.abs(poses[n, :3]) < _LARGEST_M  # false for numbers that are not finite
-        valid[n] = near.all() and np.isfinite(poses[n, 3:]).all()
-    if valid.all():
-        matrices = np.empty((len(rows), 3, 3))
-        quaternions_to_matrices(poses[:, 3:], matrices)
+        valid[n] = True
+        for k in range(3):
+            if not abs(poses[n, k]) < _LARGEST_M:  # true for numbers that are not finite
+                valid[n] = False
+        for k in range(3, 7):
+            if not np.isfinite(poses[n, k]):
+                valid[n] = False
+        all_valid = all_valid and valid[n]
+    if all_valid:
         for n in range(len(rows)):
-            positions[rows[n]] = poses[n, :3]
-            rotations[rows[n]] = matrices[n]
-    return valid
+            row = rows[n]
+            for k in range(3):
+                positions[row, k] = poses[n, k]
+            quaternions_to_matrices(poses[n : n + 1, 3:], rotations[row : row + 1])
+    return all_valid
 
 
 def _anything(prop: Prop) -> bool:
