@@ -21,6 +21,9 @@ SHIRTS = ((0.20, 0.40, 0.90), (0.90, 0.30, 0.20), (0.20, 0.75, 0.30), (0.90, 0.8
 _CLOTHED = {"spine": "shirt", "chest": "shirt", "upper_arm": "shirt"}
 _CLOTHED |= {"pelvis": "trousers", "thigh": "trousers", "shank": "trousers", "foot": "shoes"}
 _PUPIL_M = 0.012  # radius of what is drawn
+# the open rims of the mesh come out of the pelvis in a step
+_LINED = ("l_thigh", "r_thigh")
+_LINING_M = 0.003  # below the surface of the skin, outside of which it is not seen
 # hair is behind and above this plane in the head's frame: n . x = d, metres
 _HAIRLINE_NORMAL, _HAIRLINE_M = np.array([-0.6, 0.0, 0.8]), 0.048
 
@@ -38,12 +41,17 @@ def bone_geoms(skeleton: Skeleton, shirt: tuple[float, float, float]) -> list[li
     """Return the primitives on each of the 47 frames of a body.
 
     The primitives of the bones, with their flexible skin, are for touch and for shadows; they are
-    invisible, and the skin mesh is drawn in their place. The pupils are drawn as spheres.
+    invisible, and the skin mesh is drawn in their place. The pupils are drawn as spheres, and the
+    thighs once more below their skin: nobody looks through the gap between the mesh's thighs and
+    its pelvis.
     """
     frames = [
         [_geom(part, bone, _colour(bone, shirt)) for part in bone.colliders]
         for bone in skeleton.bones
     ]
+    for name in _LINED:
+        row = skeleton.bone(name)
+        frames[row] += [_lining(geom) for geom in frames[row]]
     size = skeleton.growth.head_size
     for eye in EYES:
         x, y, z = MOUNTS_M[eye]
@@ -56,6 +64,13 @@ def bone_geoms(skeleton: Skeleton, shirt: tuple[float, float, float]) -> list[li
         )
         frames[skeleton.bone("head")].append(pupil)
     return frames
+
+
+def _lining(geom: Geom) -> Geom:
+    """Return what is drawn below the skin of a bone, cf. `_geom`."""
+    radius, *lengths = geom.size
+    size = radius - _LINING_M, *lengths
+    return replace(geom, size=size, visible=True, tangible=False, skin_m=0.0)
 
 
 def _hairy(mesh: Mesh, head: int, head_size: float) -> NDArray[np.bool_]:
