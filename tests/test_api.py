@@ -67,8 +67,20 @@ def test_choices_are_shown_as_arguments():
         shown = signature(function).parameters
         assert set(GameChoices.__annotations__) < set(shown)
         assert all(one.kind is not Parameter.VAR_KEYWORD for one in shown.values())
-    with pytest.raises(TypeError, match="sense_presets"):
-        veca_marl.make("KickTheBall", sense_presets={})
+
+
+@pytest.mark.parametrize("function", [veca_marl.make, veca_marl.train])
+def test_an_argument_that_does_not_exist_is_refused_with_those_that_do(function):
+    with pytest.raises(TypeError, match=naming("sense", "senses", "development", "overrides")):
+        function("KickTheBall", sense={})
+
+
+def test_an_age_is_an_argument():
+    grown = veca_marl.make("KickTheBall", development=8)
+    told = veca_marl.make("KickTheBall", overrides=["development=8"])
+    assert grown.games[0].cfg == told.games[0].cfg
+    with pytest.raises(ConfigError, match=naming("80", "36")):
+        veca_marl.make("KickTheBall", development=80)
 
 
 def test_an_environment_says_what_it_is_and_where_its_tensors_are():

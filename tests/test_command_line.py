@@ -129,6 +129,16 @@ def test_a_quoted_path_stays_as_it_is(path):
     assert normalised([f"run={quoted('~/a')}"]) == ["run='~/a'"]
 
 
+@pytest.mark.parametrize("name", ["KickTheBall,collect=one", "a (1)", "it's, here"])
+@pytest.mark.parametrize("ending", ["", ":red"])
+def test_a_path_that_exists_is_read_whatever_its_characters(tmp_path, monkeypatch, name, ending):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / name).mkdir(parents=True)
+    for path in (f"runs/{name}{ending}", f"{tmp_path}/runs/{name}{ending}"):
+        ((options, _),) = LINE.jobs([f"run={path}"])
+        assert options.run == path
+
+
 @pytest.mark.parametrize(
     "value",
     ["[~/a,/b (1)]", "['a',./b]", "'/data/a,/b'", '"/a,~/b"', "choice(/a,/b)", "{a:/x,b:/y}"],

@@ -264,3 +264,9 @@ def test_what_is_composed_again_has_no_trace_of_what_was_changed():
     assert compose_node([KICK]).total_frames == compose([KICK]).total_frames != 5
     assert compose_node([KICK]).task.max_seconds == compose([KICK]).task.max_seconds
     assert compose([KICK]).task.max_seconds not in (1.5, 2.5)
+
+
+@pytest.mark.parametrize("key", ["init_from", "opponent"])
+def test_a_value_without_its_team_is_refused_with_the_words_that_name_one(key):
+    with pytest.raises(ConfigError, match=naming(f"{key}.TEAM=", f"{key}.agents")):
+        compose([KICK, f"{key}=zoo/KickTheBall"])

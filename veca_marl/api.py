@@ -24,6 +24,7 @@ from veca_marl.config import ConfigError, compose_node, to_config
 from veca_marl.config.choices import (
     GameChoices,
     check_list,
+    check_names,
     check_overrides,
     choose,
     chosen_overrides,
@@ -123,6 +124,7 @@ def make(
         **choices: ``playground``, a file of `conf/playground`, such as `simple` (None is the
             task's own); ``body``, a file of `conf/body`, such as `walker_discrete`; ``senses``,
             sense to preset, a file of `conf/senses/<sense>`, such as `{"audio": "mono"}`;
+            ``development``, an age in months, from 1 to 36, of bodies and senses;
             ``overrides``, anything else of the game that the command line takes, such as
             `["task.life_s=4.0"]`; ``plugins``, packages that add tasks or presets and are not
             installed as plug-ins.
@@ -287,6 +289,7 @@ def train(
             trains in it, or a run is to be resumed.
         CheckpointError: If something cannot be loaded or stored.
     """
+    check_names(choices)
     path = None if folder is None else check_folder(folder, "folder")
     with nullcontext() if path is None else locked(path):
         run = None if path is None else new_run(path)

@@ -24,10 +24,10 @@ def is_within(key: str, parts: Iterable[str]) -> bool:
 def normalised(overrides: Sequence[str]) -> list[str]:
     """Write paths and integers in overrides so that they are read as what they are.
 
-    - A value that begins with ``/``, ``./``, ``../`` or ``~`` is a path: ``~`` becomes the home
-      directory, and a path with characters of the grammar (``run=/data/a (1)``) is quoted. A comma
-      separates the values of a sweep, so that a path with one has to be quoted by hand:
-      ``"run='/data/a,b'"``. Lists, functions and quoted texts stay as they are.
+    - A value with a ``/`` that names an existing file or folder is its path, whatever characters it
+      has; so is one that begins with ``/``, ``./``, ``../`` or ``~``, which becomes the home
+      directory. A comma in others separates the values of a sweep: a path that does not exist yet
+      is quoted by hand, ``"to='/data/a,b'"``. Lists, functions and quoted texts stay as they are.
     - An integral number in exponent notation (``total_frames=1e6``) gets digits only, which fields
       of type int accept as well as those of type float; so do the values of a sweep.
 
@@ -38,6 +38,8 @@ def normalised(overrides: Sequence[str]) -> list[str]:
 
 def _normalised(text: str) -> str:
     key, equals, value = text.partition("=")
+    if "/" in value and not _PLAIN.fullmatch(value) and _exists(value):
+        return f"{key}={_path(value)}"
     parts = value.split(",")
     if not equals or not all(parts):
         return text
@@ -46,6 +48,12 @@ def _normalised(text: str) -> str:
     else:
         written = [_integer(part) for part in parts]
     return f"{key}={','.join(written)}"
+
+
+def _exists(text: str) -> bool:
+    """Return whether a text names a file or folder, or one and a team in it: ``FOLDER:TEAM``."""
+    path = os.path.expanduser(text)
+    return os.path.lexists(path) or os.path.lexists(path.rpartition(":")[0])
 
 
 def _path(text: str) -> str:

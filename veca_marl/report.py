@@ -25,6 +25,8 @@ from veca_marl.algos.files import WriteError, write_atomically
 from veca_marl.config import ConfigError
 from veca_marl.config.command_line import CommandLine, check_folder
 from veca_marl.config.experiment import ExperimentCfg, parse_claim
+from veca_marl.config.overrides import parse
+from veca_marl.override_text import normalised
 from veca_marl.reports.arms import Arm, compose_arms, compose_sweep
 from veca_marl.reports.figure import check_plotting, draw
 from veca_marl.reports.gather import (
@@ -172,7 +174,12 @@ def run(options: ReportOptions, overrides: list[str]) -> None:
 
 
 def _is_plain_sweep(overrides: Sequence[str]) -> bool:
-    """Return whether overrides list values without an experiment that has arms."""
+    """Return whether overrides list values without an experiment that has arms.
+
+    Raises:
+        ConfigError: If one does not follow the grammar.
+    """
+    parse(normalised(overrides))
     return is_sweep(overrides) and "experiment" not in map(key_of, overrides)
 
 

@@ -12,6 +12,7 @@ from veca_marl.config.overrides import parse, root_of
 from veca_marl.config.root import Config
 from veca_marl.envs.core.game_cfg import GameCfg, Script
 from veca_marl.override_text import normalised
+from veca_marl.registry import unknown
 
 # `opponent` is the configuration of `GameCfg.script`
 _GAME_ROOTS = {f.name for f in fields(GameCfg)} - {"script"} | {
@@ -27,6 +28,7 @@ class GameChoices(TypedDict, total=False):
     playground: str | None
     body: str | None
     senses: Mapping[str, str] | None
+    development: float | None
     overrides: Sequence[str]
     plugins: Sequence[str]
 
@@ -35,9 +37,11 @@ def choose(task: str, **choices: Unpack[GameChoices]) -> GameCfg:
     """Return the configuration of the game that `make` makes.
 
     Raises:
+        TypeError: If there is no such argument; the message lists those there are.
         ConfigError: If there is no such choice, or an override is not of the game; the message
             lists the choices there are.
     """
+    check_names(choices)
     texts = chosen_overrides(task, **choices)
     check_overrides(choices.get("overrides", ()), {"task": "task", "seed": "seed"}, _GAME_ROOTS)
     return compose_game(texts).game
@@ -60,12 +64,23 @@ def compose_game(overrides: Sequence[str]) -> Config:
     return cfg
 
 
+def check_names(choices: Mapping[str, object]) -> None:
+    """Raise `TypeError` for an argument that does not exist; the message lists those there are."""
+    names = list(GameChoices.__annotations__)
+    for name in choices.keys() - names:
+        raise TypeError(
+            f"{unknown('argument', name, names)}; further words of the command line are "
+            'overrides=["KEY=VALUE"]'
+        )
+
+
 def chosen_overrides(
     task: str,
     *,
     playground: str | None = None,
     body: str | None = None,
     senses: Mapping[str, str] | None = None,
+    development: float | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[str] = (),
 ) -> list[str]:
@@ -84,6 +99,8 @@ def chosen_overrides(
     for key, value in chosen.items():
         if not isinstance(value, str):
             raise ConfigError(f"{key.lstrip('+')}={value!r} must be a name, as text")
+    if development is not None:
+        chosen["development"] = str(development)
     packages = [f"plugins=[{','.join(plugins)}]"] if plugins else []
     return [*(f"{key}={value}" for key, value in chosen.items()), *packages, *overrides]
 

@@ -13,6 +13,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import ConfigKeyError, OmegaConfBaseException
 
 _NO_GROUP = re.compile("Invalid type assigned: .* is not a subclass of")
+_NO_TEAMS = re.compile(r"Cannot assign \w+ to Dict\[str, (str|Dict.*)\]")
 _NO_LIST = re.compile("is not a ListConfig, list or tuple")
 
 
@@ -70,6 +71,9 @@ def _wrong_value(error: OmegaConfBaseException) -> str:
         return f"{error.full_key} is a group of values, not a single one{preset}"
     if _NO_LIST.search(message) and error.full_key:
         return f"{error.full_key} must be a list, such as {error.full_key}=[...]"
+    if _NO_TEAMS.search(message) and error.full_key:
+        key = error.full_key
+        return f"{key} has a value for each team: {key}.TEAM=VALUE, of a single team {key}.agents"
     _, resolver, said = message.partition(" raised while resolving interpolation: ")
     if resolver:
         return said

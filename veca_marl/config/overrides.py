@@ -36,7 +36,9 @@ def _parse(parser: OverridesParser, text: str) -> Override:
         return parser.parse_override(text)
     except (HydraException, ValueError) as error:  # also of a number that Python does not read
         key, equals, value = text.partition("=")
-        advice = f"; quoted it is a text: {key}={quoted(value)}" if equals and value else ""
+        advice = "; words are KEY=VALUE" if not equals else ""
+        if equals and value:  # with the marks that a shell leaves
+            advice = f'; quoted it is a text: "{key}={quoted(value)}"'
         reason = one_line(error).partition(" See https://hydra.cc")[0]
         raise ConfigError(f"{text} cannot be read as an override ({reason}){advice}") from error
 

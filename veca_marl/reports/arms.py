@@ -108,7 +108,10 @@ def compose_arms(overrides: Sequence[str]) -> list[Arm]:
     """
     experiment = compose_node(overrides).experiment
     if experiment.name is None:
-        raise ConfigError("no experiment with arms: add +experiment=NAME")
+        raise ConfigError(
+            "no experiment with arms: add +experiment=NAME, or, for a sweep without one, -m and all "
+            "words of its command"
+        )
     if not experiment.arms or not experiment.seeds:
         raise ConfigError(f"experiment {experiment.name} has no arms or no seeds")
     return [_compose_arm(overrides, str(name), list(own)) for name, own in experiment.arms.items()]

@@ -41,6 +41,18 @@ def test_a_frame_has_the_size_that_is_asked_for(game):
         assert frame.dtype == np.uint8
 
 
+def test_choices_are_given_by_name(game):
+    spectator = Spectator(game)
+    size = {"width": 320, "height": 180}
+    named = spectator.frame(**size, camera="above", quality="fast")
+    kinds = {"camera": CameraKind.above, "quality": FilmQuality.fast}
+    np.testing.assert_array_equal(named, Spectator(game).frame(**size, **kinds))
+    with pytest.raises(ValueError, match=naming("abov", "above", "follow")):
+        spectator.frame(camera="abov")
+    with pytest.raises(TypeError, match=naming("size", "width", "quality")):
+        spectator.frame(size=3)
+
+
 def test_panels_take_room_of_the_senses_that_there_are(game):
     """Without senses the view is wider."""
     seen = game.observe(game.players[0])

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from veca_marl.sim.hearing import AudioSense
 from veca_marl.sim.vision import Camera
 
 ALL = "all"
+Kind = TypeVar("Kind", bound=Enum)
 _ROWS = 720  # of the picture in which text has its own size
 _NARROWEST, _WIDEST = 0.22, 0.36  # of the panels, as fractions of the picture
 
@@ -66,7 +67,7 @@ class FilmCfg:
     """How a game is shown to people.
 
     Attributes:
-        camera: What the camera does, see `CameraKind`.
+        camera: What the camera does, see `CameraKind`; in Python also by its name.
         agent: Name of the agent that is shown; its senses are in the panels. `all` shows all agents
             in one view, or each in a view of its own if the playground has several rooms; empty is
             `all` in a game of several agents.
@@ -74,7 +75,7 @@ class FilmCfg:
         height: Height, even.
         panels: Whether there are panels beside the view: of the senses that the agent has, of the
             reward and of the text.
-        quality: Shadows and edges, see `FilmQuality`.
+        quality: Shadows and edges, see `FilmQuality`; in Python also by its name.
 
     Raises:
         ValueError: If a number is outside of its range.
@@ -88,13 +89,21 @@ class FilmCfg:
     quality: FilmQuality = FilmQuality.auto
 
     def __post_init__(self) -> None:
-        for key, kinds in (("camera", CameraKind), ("quality", FilmQuality)):
-            if not isinstance(getattr(self, key), kinds):
-                names = ", ".join(kind.name for kind in kinds)
-                raise ValueError(f"{key}={getattr(self, key)!r}; choices: {names}")
+        self.camera = _kind("camera", self.camera, CameraKind)
+        self.quality = _kind("quality", self.quality, FilmQuality)
         for name, pixels in (("width", self.width), ("height", self.height)):
             if not 64 <= pixels <= 7680 or pixels % 2:
                 raise ValueError(f"{name}={pixels} must be an even number from 64 to 7680")
+
+
+def _kind(key: str, chosen: object, kinds: type[Kind]) -> Kind:
+    """Return a choice that may be given by its name, as on the command line."""
+    names = [kind.name for kind in kinds]
+    if isinstance(chosen, kinds):
+        return chosen
+    if isinstance(chosen, str) and chosen in names:
+        return kinds[chosen]
+    raise ValueError(f"{key}={chosen!r}; choices: {', '.join(names)}")
 
 
 class Film:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from veca_marl.envs.core.game import Game, Observation
 from veca_marl.envs.rendering.film import Film, FilmCfg, FilmQuality
+from veca_marl.registry import unknown
 
 RENDERED = FilmCfg(width=640, height=360, quality=FilmQuality.good)
 """The defaults of `render`."""
@@ -37,6 +38,9 @@ class Spectator:
             TypeError: If there is no such field.
             ValueError: If a value is impossible.
         """
+        names = [field.name for field in fields(FilmCfg)]
+        for name in choices.keys() - names:
+            raise TypeError(unknown("argument of render", name, names))
         cfg = replace(RENDERED, **choices)
         if cfg != self._film[0]:
             self._film = cfg, Film(self._game, cfg)

@@ -453,7 +453,7 @@ class VecaEnv(NotCopied, FastStepEnv):
         Args:
             world: Number of the world in this environment.
             **choices: Fields of `veca_marl.envs.rendering.FilmCfg`, such as
-                ``camera=CameraKind.above``, ``agent="red"``, ``width=1280``, ``panels=False``.
+                ``camera="above"``, ``agent="red"``, ``width=1280``, ``panels=False``.
 
         Returns:
             ``(height, width, 3)`` uint8, RGB; by default 360 x 640.
