@@ -239,6 +239,12 @@ STEPS: tuple[Step, ...] = (
         )
     ),
     Step(changes=(Grouped("collect"),)),
+    Step(
+        changes=(
+            Added("senses.audio", {"infant_age_months": None}),
+            Added("team.*.senses.audio", {"infant_age_months": None}),
+        )
+    ),
 )
 """Entry `n` leads from version `n` to version ``n + 1``."""
 

@@ -165,7 +165,10 @@ def _make(path: Path, team: str, spec: TeamSpec | None) -> tuple[Algorithm, _Sto
     if team not in learnt or team not in stored:
         raise CheckpointError(f"{path} has learnt the teams {sorted(learnt)}, not {team!r}")
     if spec is not None and (differing := spec_differences(stored[team], spec)):
-        raise CheckpointError(f"{path}: team {team!r} has other specs there: {differing}")
+        raise CheckpointError(
+            f"{path}: team {team!r} has other specs there: {differing}. The game has to have "
+            "the same body and senses; `python -m veca_marl.zoo list` has the words of the zoo's"
+        )
     spec = spec or TeamSpec.from_dict(stored[team])
     try:
         with load_errors(path), _Allocations(file.stat().st_size):

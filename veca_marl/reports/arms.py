@@ -109,8 +109,8 @@ def compose_arms(overrides: Sequence[str]) -> list[Arm]:
     experiment = compose_node(overrides).experiment
     if experiment.name is None:
         raise ConfigError(
-            "no experiment with arms: add +experiment=NAME, or, for a sweep without one, -m and all "
-            "words of its command"
+            "no experiment with arms: add +experiment=NAME, or, for a sweep without one, -m and "
+            "all words of its command"
         )
     if not experiment.arms or not experiment.seeds:
         raise ConfigError(f"experiment {experiment.name} has no arms or no seeds")

@@ -1,7 +1,7 @@
 """Policies that have learnt already: ``python -m veca_marl.zoo list``, ``... add run=runs/...``.
 
-``list`` prints the policies with their returns on the frozen episodes. ``add`` makes a file of a
-run's latest checkpoint: parameters in half precision (safetensors), configuration and provenance,
+``list`` prints the policies with their returns and the words of their runs. ``add`` makes a file of
+a run's latest checkpoint: parameters in half precision (safetensors), configuration and provenance,
 at most 2 MB; before that it is played in the 100 frozen episodes of its task, as it is stored and
 with the default parameters of the task.
 """
@@ -188,11 +188,12 @@ def table(found: Sequence[Entry]) -> list[str]:
                     "team": row["team"],
                     "algorithm": entry.algorithm.get(str(row["team"]), "-"),
                     "frames": entry.frames,
-                    "episodes": row["episodes"],
+                    "episodes": f"{row['episodes']}{' frozen' if entry.is_frozen else ''}",
                     "return": row["return"],
                     "random": other.get("return", "-"),
                     "solved": row.get("solved", "-"),
                     "bytes": entry.size,
+                    "learnt by": " ".join(map(str, entry.provenance.get("overrides", ()))),
                 }
             )
     return lines(rows) if rows else ["the zoo has no policies yet"]

@@ -26,8 +26,10 @@ class Entry:
         task: Name of the task.
         algorithm: Name of the algorithm of each team.
         frames: Frames of experience from which it has learnt.
-        evaluation: The rows of `evaluate` for the frozen episodes: of the policy and of a random
-            one, by team; their return, its interval, and `solved` in a task with a goal.
+        evaluation: The rows of `evaluate` for 100 episodes: of the policy and of a random one, by
+            team; their return, its interval, and `solved` in a task with a goal.
+        is_frozen: Whether these are the frozen episodes of the task; otherwise they are episodes of
+            the game in which it has learnt.
         provenance: Overrides, commit and versions of the run.
         size: Bytes of its file.
     """
@@ -37,6 +39,7 @@ class Entry:
     algorithm: dict[str, str]
     frames: int
     evaluation: list[dict[str, Any]]
+    is_frozen: bool
     provenance: dict[str, Any]
     size: int
 
@@ -98,6 +101,7 @@ def read_entry(path: Path) -> Entry:
         {team: numbers["name"] for team, numbers in content["algorithms"].items()},
         int(about.get("frames", 0)),
         list(about.get("evaluation", [])),
+        "benchmark" in about,
         dict(about.get("provenance", {})),
         path.stat().st_size,
     )

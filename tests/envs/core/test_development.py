@@ -15,6 +15,7 @@ def test_it_sets_body_eyes_and_ears(task):
     assert game.body.age_months == 8.0
     assert game.senses.vision.infant_age_months == 8.0
     assert game.senses.audio.head_scale == CHILD_HEAD
+    assert game.senses.audio.infant_age_months == 8.0
 
 
 def test_without_it_nothing_changes():
@@ -29,11 +30,13 @@ def test_what_a_configuration_sets_itself_stays():
         "body.height_m=0.7",
         "senses.vision.infant_age_months=2",
         "senses.audio.head_scale=0.9",
+        "senses.audio.infant_age_months=3",
     ]
     game = compose(["+task=KickTheBall", "development=8", *own]).game
     assert (game.body.age_months, game.body.height_m) == (None, 0.7)
     assert game.senses.vision.infant_age_months == 2.0
     assert game.senses.audio.head_scale == 0.9
+    assert game.senses.audio.infant_age_months == 3.0
 
 
 def test_it_is_for_all_teams():

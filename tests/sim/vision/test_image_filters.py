@@ -10,12 +10,14 @@ from veca_marl.sim.vision.image_filters import (
     CONTRAST_AT_LIMIT,
     Blur,
     Defocus,
+    FaintContrast,
     FilterContext,
     Grey,
     InfantVision,
     acuity_blur_deg,
     acuity_cpd,
     colour_gains,
+    contrast_threshold,
 )
 
 CAMERA = Camera(200, 200, fov_deg=20.0)
@@ -202,3 +204,36 @@ def test_newborns_do_not_tell_blue_from_grey():
 def test_invalid_parameters_are_refused(make, named):
     with pytest.raises(ValueError, match=named):
         make()
+
+
+@pytest.mark.parametrize("cycles_per_pixel", [0.2, 0.05, 0.02])
+def test_a_contrast_far_above_the_threshold_stays_and_one_far_below_it_goes(cycles_per_pixel):
+    """At any scale; a tenth of the threshold leaves a hundredth."""
+    for threshold in (0.03, 0.2):
+        visible = FaintContrast(threshold / 10.0)(grating(cycles_per_pixel), context_of())
+        before = contrast(grating(cycles_per_pixel), cycles_per_pixel)
+        assert contrast(visible, cycles_per_pixel) == pytest.approx(before, rel=0.05)
+    faint = grating(cycles_per_pixel, amplitude=10.0)  # a contrast of 0.08, 0.06 as a mean
+    seen = FaintContrast(0.6)(faint, context_of())
+    assert contrast(seen, cycles_per_pixel) < 0.1 * contrast(faint, cycles_per_pixel)
+
+
+def test_what_is_left_of_a_contrast_falls_with_the_threshold():
+    faint = grating(0.05, amplitude=10.0)
+    left = [contrast(FaintContrast(t)(faint, context_of()), 0.05) for t in (0.01, 0.06, 0.3)]
+    assert left == sorted(left, reverse=True)
+    shares = np.array(left) / contrast(faint, 0.05)
+    assert shares[0] > 0.9 > shares[1] > 0.1 > shares[2]
+
+
+@pytest.mark.parametrize("shape", [(2, 84, 84, 3), (1, 5, 7, 3), (1, 9, 31, 3), (1, 1, 1, 3)])
+def test_a_uniform_image_has_no_contrast_to_lose(shape):
+    images = np.full(shape, 77, np.uint8)
+    np.testing.assert_array_equal(FaintContrast(0.2)(images, context_of()), images)
+
+
+def test_infants_see_less_contrast_than_older_ones():
+    thresholds = [contrast_threshold(age) for age in AGES]
+    assert thresholds == sorted(thresholds, reverse=True)
+    assert contrast_threshold(3.0) == pytest.approx(1.0 / 13.0, rel=0.01)
+    assert max(thresholds) == 0.25

@@ -4,13 +4,15 @@ What changes with the age, and what is known of it:
 
 - *Body*: size, proportions, mass, strength, voice and gait, see
   `veca_marl.sim.body.anatomy.growth`.
-- *Eyes*: acuity and colour vision, see `veca_marl.sim.vision.image_filters`; their distance is the
-  body's. The contrast of fine detail falls with the acuity. Sensitivity to low contrast of coarse
-  patterns is an adult's.
-- *Ears*: the size of the head, with which the ears' distance and the spectral features of the
-  pinnae change. Thresholds of hearing are an adult's.
-- *Skin*: the skin of that body, whose taxels lie closer together the smaller it is. How finely the
-  skin of infants resolves has not been measured over these ages: it is not changed.
+- *Eyes*: acuity, contrast sensitivity and colour vision, see `veca_marl.sim.vision.image_filters`;
+  their distance is the body's.
+- *Ears*: thresholds of hearing, see `veca_marl.sim.hearing.infant_hearing`, and the size of the
+  head, with which the ears' distance and the spectral features of the pinnae change.
+- *Skin*: the skin of that body, with as many taxels, which lie closer together the smaller it is.
+  The receptors of a child's fingers do so too, as their number stays while the skin grows
+  (Peters & Goldreich, PLOS ONE 8 (2013) e84650, 6 to 16 years). Thresholds of touch are those of
+  adults from 7 years on (Guclu & Oztek, J. Experimental Child Psychology 98 (2007) 113); of infants
+  we know no measurement, and they are not changed.
 """
 
 from __future__ import annotations
@@ -67,7 +69,7 @@ def _body_at(body: BodyCfg, age_months: float) -> BodyCfg:
 
 def _senses_at(senses: SensesCfg, age_months: float) -> SensesCfg:
     vision = None if senses.vision is None else _vision_at(senses.vision, age_months)
-    audio = None if senses.audio is None else _audio_at(senses.audio)
+    audio = None if senses.audio is None else _audio_at(senses.audio, age_months)
     return replace(senses, vision=vision, audio=audio)
 
 
@@ -77,6 +79,11 @@ def _vision_at(vision: VisionCfg, age_months: float) -> VisionCfg:
     return replace(vision, infant_age_months=age_months)
 
 
-def _audio_at(audio: AudioCfg) -> AudioCfg:
+def _audio_at(audio: AudioCfg, age_months: float) -> AudioCfg:
     """Return the ears of a child; those of a body of another size follow its head."""
-    return replace(audio, head_scale=CHILD_HEAD) if audio.head_scale == 1.0 else audio
+    own = audio.infant_age_months
+    return replace(
+        audio,
+        head_scale=CHILD_HEAD if audio.head_scale == 1.0 else audio.head_scale,
+        infant_age_months=age_months if own is None else own,
+    )

@@ -16,7 +16,7 @@ from veca_marl.envs.tasks.floors.floor_plan import FloorPlan
 from veca_marl.envs.tasks.navigation.multi_agent_nav import MultiAgentNav
 from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats, Pose
-from veca_marl.sim.hearing import AudioSense
+from veca_marl.sim.hearing import AudioSense, Noise
 from veca_marl.sim.physics import RoomCfg, World
 from veca_marl.sim.sound import Call
 from veca_marl.sim.sound.surroundings import Arrivals
@@ -60,10 +60,10 @@ class CallSourceMap:
         heard: Whether a call has been heard.
     """
 
-    def __init__(self, world: World, noise_power: float = 0.0) -> None:
+    def __init__(self, world: World, noise_power: Noise = 0.0) -> None:
         self._world = world
         self._noise_power = noise_power
-        self._audible = max(10.0 ** (2.0 * _AUDIBLE), noise_power)
+        self._audible = max(10.0 ** (2.0 * _AUDIBLE), float(np.max(noise_power)))
         self._places = np.concatenate([_grid(room) for room in world.playground.rooms])
         self._log_likelihood = np.zeros(len(self._places))
         self.heard = False
@@ -108,7 +108,7 @@ def _grid(room: RoomCfg) -> Floats:
     return np.stack(np.meshgrid(x, y, [0.0]), axis=-1).reshape(-1, 3)
 
 
-def sound_power(audio: NDArray[Any], noise_power: float = 0.0) -> Floats:
+def sound_power(audio: NDArray[Any], noise_power: Noise = 0.0) -> Floats:
     """Return the squared magnitudes of what is heard, ``(2, bins)``.
 
     Args:
@@ -151,7 +151,7 @@ class ObjectSearch:
         locomotion: Locomotion,
         plan: FloorPlan,
         world: World,
-        noise_power: float = 0.0,
+        noise_power: Noise = 0.0,
     ) -> None:
         step_s = world.clock.step_s
         self._body, self._plan = body, plan
@@ -249,7 +249,7 @@ class MultiAgentNavExpert(Expert[MultiAgentNav]):
         locomotion = locomotion_of(self.player, world.clock.step_s)
         ears = self.player.senses.get("audio")
         self._ears = ears if isinstance(ears, AudioSense) else None
-        noise_power = 0.0 if self._ears is None else self._ears.noise_power
+        noise_power: Noise = 0.0 if self._ears is None else self._ears.noise_power
         self._search = ObjectSearch(body, locomotion, self.task.plan, world, noise_power)
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:

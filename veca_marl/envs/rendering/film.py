@@ -35,6 +35,7 @@ from veca_marl.sim.vision import Camera
 ALL = "all"
 Kind = TypeVar("Kind", bound=Enum)
 _ROWS = 720  # of the picture in which text has its own size
+_HIGHEST_SPECTRA = 0.7  # of their width
 _NARROWEST, _WIDEST = 0.22, 0.36  # of the panels, as fractions of the picture
 
 
@@ -206,6 +207,9 @@ class Film:
         heights = self._relative_heights(seen)
         room = (cfg.height - text - terms) / max(sum(heights.values()), 0.01)
         width = round(min(max(room, _NARROWEST * cfg.width), _WIDEST * cfg.width) / 2.0) * 2
+        if "audio" in heights:  # spectra are read at any height: they take what is left
+            left = cfg.height - text - terms - sum(heights.values()) * width
+            heights["audio"] += min(max(left / width, 0.0), _HIGHEST_SPECTRA - heights["audio"])
         column = blank(cfg.height, width)
         panels = self._sense_panels(seen, heights, width)
         if bars:

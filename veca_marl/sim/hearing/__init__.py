@@ -5,6 +5,7 @@ from veca_marl.sim.hearing.audio_sense import (
     AudioQuality,
     AudioSense,
     Encoding,
+    Noise,
     Window,
     log_spectrum,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "HrtfReceiver",
     "HrtfTable",
     "MonoReceiver",
+    "Noise",
     "SofaError",
     "StereoReceiver",
     "Window",

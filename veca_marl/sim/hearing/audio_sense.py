@@ -15,6 +15,7 @@ from veca_marl.sim.body import Body
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing.head_response import HeadResponse, check_scale
 from veca_marl.sim.hearing.hrtf import kemar_response, kemar_table, sofa_response, sofa_table
+from veca_marl.sim.hearing.infant_hearing import threshold_powers
 from veca_marl.sim.hearing.receivers import HrtfReceiver, MonoReceiver, StereoReceiver
 from veca_marl.sim.hearing.sofa_file import check_can_read_sofa
 from veca_marl.sim.physics import World
@@ -35,6 +36,8 @@ SILENCE = -8.0
 """``log10(MAGNITUDE_FLOOR)``, the observed value of exact silence."""
 
 Samples = NDArray[np.float32]
+Noise = float | Samples
+"""Squared magnitude of a receiver's own noise: of all bins, or ``(bins,)``."""
 
 
 class Window(Enum):
@@ -63,13 +66,13 @@ def noise_power(noise_floor_db: float | None, weights: Samples) -> float:
     return float(10.0 ** (noise_floor_db / 10.0) * (weights**2).sum())
 
 
-def log_spectrum(samples: Samples, noise_power: float = 0.0, bins: int = N_BINS) -> Samples:
+def log_spectrum(samples: Samples, noise_power: Noise = 0.0, bins: int = N_BINS) -> Samples:
     """Return ``log10(|rfft(samples)| + 1e-8)`` of the first bins.
 
     Args:
         samples: ``(..., 1024)`` windowed sound pressure.
-        noise_power: Expected squared magnitude of the receiver's own noise; it is added to the
-            squared magnitude of each bin.
+        noise_power: Expected squared magnitude of the receiver's own noise, of all bins or
+            ``(bins,)``; it is added to the squared magnitude of each bin.
         bins: Number of bins, at most 513.
 
     Returns:
@@ -78,9 +81,9 @@ def log_spectrum(samples: Samples, noise_power: float = 0.0, bins: int = N_BINS)
     return _log_magnitudes(scipy.fft.rfft(samples)[..., :bins], noise_power)
 
 
-def _log_magnitudes(spectrum: NDArray[np.complex64], noise_power: float) -> Samples:
+def _log_magnitudes(spectrum: NDArray[np.complex64], noise_power: Noise) -> Samples:
     magnitude = np.abs(spectrum)
-    if noise_power > 0.0:
+    if not isinstance(noise_power, float) or noise_power > 0.0:
         magnitude = np.sqrt(magnitude**2 + np.float32(noise_power))
     logarithm = np.log10(magnitude + np.float32(MAGNITUDE_FLOOR))
     # the float32 logarithm of the floor may round to just below the lower bound of the spec
@@ -95,7 +98,7 @@ differences of phase above it (Brughera, Dunai & Hartmann 2013, J. Acoust. Soc. 
 _PHASE_SLOPE = 4
 
 
-def interaural_phase(spectrum: NDArray[np.complex64], noise_power: float = 0.0) -> Samples:
+def interaural_phase(spectrum: NDArray[np.complex64], noise_power: Noise = 0.0) -> Samples:
     """Return cosine and sine of the phase of the left ear relative to the right one.
 
     With a source on the left the left ear is ahead: the sine is positive at low frequencies. Both
@@ -139,7 +142,7 @@ class Encoder(Protocol):
     """Computes an observation from the last samples at the ears."""
 
     @property
-    def noise_power(self) -> float:
+    def noise_power(self) -> Noise:
         """See `log_spectrum`."""
         ...
 
@@ -168,7 +171,7 @@ class MagnitudeEncoder:
     """
 
     weights: Samples = field(repr=False)
-    noise_power: float
+    noise_power: Noise
     bins: int
 
     @property
@@ -230,7 +233,13 @@ _ENCODERS = {
 }
 
 
-def make_encoder(encoding: Encoding, window: Window, noise_db: float | None, bins: int) -> Encoder:
+def make_encoder(
+    encoding: Encoding,
+    window: Window,
+    noise_db: float | None,
+    bins: int,
+    age_months: float | None = None,
+) -> Encoder:
     """Construct the encoder of an encoding.
 
     Args:
@@ -238,9 +247,13 @@ def make_encoder(encoding: Encoding, window: Window, noise_db: float | None, bin
         window: See `Window`.
         noise_db: Level of the receiver's own noise, see `noise_power`.
         bins: Number of bins.
+        age_months: Age by which the noise has the thresholds of hearing too; None for none.
     """
     weights = window_weights(window)
-    return _ENCODERS[encoding](weights, noise_power(noise_db, weights), bins)
+    noise: Noise = noise_power(noise_db, weights)
+    if age_months is not None:
+        noise = noise + threshold_powers(age_months, weights, SAMPLE_RATE_HZ, bins)
+    return _ENCODERS[encoding](weights, noise, bins)
 
 
 class AudioQuality(Enum):
@@ -286,6 +299,9 @@ class AudioCfg:
         noise_floor_db: Level of the receiver's own noise relative to an rms pressure of 1, from
             -200 to 200, such as -80, or None. Its expected power is added, so that nothing becomes
             random.
+        infant_age_months: Age of the ears: a tone at the threshold of hearing of that age is as
+            loud as the receiver's own noise, see `veca_marl.sim.hearing.infant_hearing`; None for
+            no threshold.
     """
 
     present: bool = True
@@ -298,6 +314,7 @@ class AudioCfg:
     head_scale: float = 1.0
     window: Window = Window.rectangular
     noise_floor_db: float | None = None
+    infant_age_months: float | None = None
 
     def __post_init__(self) -> None:
         _check_choice("quality", self.quality, AudioQuality)
@@ -316,6 +333,11 @@ class AudioCfg:
             raise ValueError(
                 f"senses.audio.noise_floor_db={self.noise_floor_db} must be from {-_MOST_DB:g} to "
                 f"{_MOST_DB:g}, or null for no noise"
+            )
+        age_months = self.infant_age_months
+        if age_months is not None and not 0.0 < age_months < math.inf:
+            raise ValueError(
+                f"senses.audio.infant_age_months={age_months} must be finite and positive, or null"
             )
 
 
@@ -355,14 +377,16 @@ class AudioSense(Sense):
             body.deaf_to,
         )
         self._teleports = body.teleports
-        self._encoder = make_encoder(cfg.encoding, cfg.window, cfg.noise_floor_db, cfg.bins)
+        self._encoder = make_encoder(
+            cfg.encoding, cfg.window, cfg.noise_floor_db, cfg.bins, cfg.infant_age_months
+        )
         self._recent = np.zeros((2, max(WINDOW_SAMPLES, field.step_samples)), np.float32)
         self.specs = {"audio": self._encoder.spec}
         if cfg.waveform:
             self.specs["waveform"] = ArraySpec((2, field.step_samples), np.float32)
 
     @property
-    def noise_power(self) -> float:
+    def noise_power(self) -> Noise:
         """Squared magnitude of the receivers' own noise in each bin; 0 without noise."""
         return self._encoder.noise_power
 

@@ -146,7 +146,8 @@ class VisionCfg:
         eyes: `monocular` repeats the image of the left eye for the right one.
         grey: Replace colours by luma.
         blur_deg: Standard deviation of a Gaussian blur in degrees of visual angle; 0 for none.
-        infant_age_months: Acuity and colour vision of an infant of that age; None for an adult's.
+        infant_age_months: Acuity, contrast sensitivity and colour vision of an infant of that age;
+            None for an adult's.
         defocus: Blur surfaces that are not at the focal distance of the eyes, see `Defocus`.
         pupil_mm: Diameter of the pupil with `defocus`, above 0 and at most 20 mm; those of humans
             have 2 to 8 mm. A surface that is out of focus by D dioptres is blurred over a disc of
