@@ -37,7 +37,7 @@ SILENCE = -8.0
 
 Samples = NDArray[np.float32]
 Noise = float | Samples
-"""Squared magnitude of a receiver's own noise: of all bins, or ``(bins,)``."""
+"""Squared magnitude of a receiver's own noise, of all bins or ``(bins,)``."""
 
 
 class Window(Enum):
