@@ -10,7 +10,7 @@ DOWN = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0.0]])
 LOW_BOX = Shape.BOX, (0.1, 0.1, 0.02)
 
 
-def floor_brightness(bottom_m=None, shape=Shape.SPHERE, size=(0.2,)):
+def floor_brightness(bottom_m=None, shape=Shape.SPHERE, size=(0.2,), tangible=True):
     """Red channel of the floor from above, beside and around a primitive at some height."""
     scene = Scene()
     scene.add_object(
@@ -18,7 +18,7 @@ def floor_brightness(bottom_m=None, shape=Shape.SPHERE, size=(0.2,)):
     )
     if bottom_m is not None:
         half = size[0] if shape is Shape.SPHERE else size[2]
-        thing = scene.add_object("thing", [[Geom(shape, size)]])
+        thing = scene.add_object("thing", [[Geom(shape, size, tangible=tangible)]])
         thing.positions[0] = (0, 0, bottom_m + half)
     scene.update()
     views = Camera(200, 200).render(scene, [Pose(np.array([0, 0, 2.0]), DOWN)])
@@ -43,6 +43,12 @@ def test_a_primitive_beyond_the_reach_casts_no_shadow():
     ]
     assert darkest == sorted(darkest)
     assert darkest[0] < darkest[1] < darkest[2] == 1.0
+
+
+def test_what_is_only_seen_casts_no_contact_shadow():
+    """Such as the mark of a place on the floor."""
+    marked = floor_brightness(0.0, *LOW_BOX, tangible=False)
+    assert np.nanmin(marked / floor_brightness()) == 1.0
 
 
 def test_a_primitive_larger_than_the_limit_casts_no_shadow():

@@ -195,6 +195,6 @@ def _drawn(scene: Scene, hidden: Bools | None) -> DrawMasks:
     if shown.shape != (count,):
         raise ValueError(f"hidden has shape {shown.shape}; the scene has {count} surfaces")
     first = len(geoms.shapes)
-    casting = ~geoms.transparent & shown[:first]
+    opaque = ~geoms.transparent & shown[:first]
     glass = geoms.transparent & geoms.visible & shown[:first]
-    return DrawMasks(casting & geoms.visible, glass, casting, shown[first:])
+    return DrawMasks(opaque & geoms.visible, glass, opaque & geoms.tangible, shown[first:])

@@ -175,7 +175,7 @@ class DrawMasks(NamedTuple):
     Attributes:
         opaque: ``(G,)`` opaque primitives.
         glass: ``(G,)`` transparent primitives.
-        casting: ``(G,)`` primitives that cast contact shadows, bones in place of the skin on them.
+        casting: ``(G,)`` primitives that cast contact shadows: tangible ones, of bodies the bones.
         triangles: ``(T,)`` triangles.
     """
 
