@@ -73,7 +73,7 @@ def _wrong_value(error: OmegaConfBaseException) -> str:
         return f"{error.full_key} must be a list, such as {error.full_key}=[...]"
     if _NO_TEAMS.search(message) and error.full_key:
         key = error.full_key
-        return f"{key} has a value for each team: {key}.TEAM=VALUE, of a single team {key}.agents"
+        return f"{key} needs a team: {key}.TEAM=VALUE; in a game of one team {key}.agents=VALUE"
     _, resolver, said = message.partition(" raised while resolving interpolation: ")
     if resolver:
         return said

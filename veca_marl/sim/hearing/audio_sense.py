@@ -301,7 +301,7 @@ class AudioCfg:
             random.
         infant_age_months: Age of the ears: a tone at the threshold of hearing of that age is as
             loud as the receiver's own noise, see `veca_marl.sim.hearing.infant_hearing`; None for
-            no threshold.
+            no threshold. Like that noise it is in spectra and not in samples.
     """
 
     present: bool = True

@@ -18,13 +18,13 @@ and what is our own assumption:
   falling for years (Knoblauch, Vital-Durand & Barbur, Vision Research 2001). Banks & Bennett
   (J. Opt. Soc. Am. A 1988) explain the poor colour vision of newborns by immature cones alone.
   **The gains below are our interpolation of that order, not measurements.**
-
-- *Contrast*: the greatest sensitivity to contrast of an infant is about its age in weeks (review of
-  Brown & Lindsey, "Contrast insensitivity: the critical immaturity in infant visual
-  performance", Optometry and Vision Science 86 (2009) 572-576), and functions of all ages have one
-  shape, which is moved along both axes. It counts at all frequencies below the acuity limit here,
-  and beyond the six months of the data, which is **our extrapolation**: 0.6 % at three years, where
-  a step of the images is 0.4 %. How much of a contrast above the threshold is left is ours too.
+- *Contrast*: behavioural contrast sensitivity at its peak is about the age in weeks (review of
+  Brown & Lindsey, Optometry and Vision Science, June 2009, PMC2765046; most data are of one to four
+  months), and the functions of all ages have one shape that moves along both axes (Movshon &
+  Kiorpes, J. Opt. Soc. Am. A 1988; both read in their abstracts). The peak of an age counts at all
+  frequencies below the acuity limit here, and the rule at all ages, which is **our extrapolation**:
+  0.6 % at three years, where a step of the images is 0.4 %. That what is left of a faint contrast
+  is the probability of seeing it is ours too.
 
 Field of view and eye alignment are an adult's.
 """
@@ -250,25 +250,27 @@ _YOUNGEST_WEEKS = 4.0  # of the data; younger ones have the contrast threshold o
 
 
 def contrast_threshold(age_months: float) -> float:
-    """Return the least contrast that an infant sees, relative to the local mean."""
+    """Return the least contrast that an infant sees, relative to the local mean, in (0, 1]."""
     return 1.0 / max(age_months * _WEEKS_PER_MONTH, _YOUNGEST_WEEKS)
 
 
 _COARSEST_PIXELS = 4
 _AROUND_PIXELS = 2.0
+_SHARE = 0.5  # of the amplitude of a grating that is in the band of its frequency, but the finest
 _STEEPNESS = 3.5
 
 
 @dataclass(frozen=True)
-class FaintContrast:
+class ContrastThreshold:
     """Takes away what has a contrast below a threshold, at every scale.
 
-    An image is divided into octave bands of spatial frequency (Burt & Adelson, IEEE Transactions on
-    Communications 31 (1983), the Laplacian pyramid). The contrast c of a band is its value relative
-    to the mean of the surroundings, all coarser bands (Peli, "Contrast in complex images", J. Opt.
-    Soc. Am. A 7 (1990) 2032): the amplitude of a grating with the mean square of the three colours
-    and of a few pixels. With the threshold T, ``1 - exp(-(c / T)^3.5)`` of it is left, the
-    probability of seeing it (Robson & Graham, Vision Research 21 (1981) 409).
+    An image is divided into octave bands of spatial frequency (a Laplacian pyramid, Burt & Adelson,
+    IEEE Transactions on Communications 1983, by means of areas, so that a mirror image gives the
+    mirror image). The contrast c of a band is its value relative to the mean of the surroundings,
+    all coarser bands (Peli, "Contrast in complex images", J. Opt. Soc. Am. A 1990): the amplitude
+    of a grating that has the mean square of the three colours and of a few pixels around. With the
+    threshold T, the fraction ``1 - exp(-(c / T)^3.5)`` of the band is left, the probability of
+    seeing it (Robson & Graham, Vision Research 1981).
 
     Attributes:
         threshold: T, in (0, 1].
@@ -279,24 +281,26 @@ class FaintContrast:
     def __call__(self, images: Images, context: FilterContext) -> Images:
         """Return images without faint contrast."""
         out = np.empty_like(images)
-        for image, faded in zip(images, out, strict=True):
-            faded[:] = np.clip(np.rint(self._faded(image.astype(np.float32))), 0.0, 255.0)
+        for image, filtered in zip(images, out, strict=True):
+            filtered[:] = np.clip(np.rint(self._filtered(image.astype(np.float32))), 0.0, 255.0)
         return out
 
-    def _faded(self, image: Depths) -> Depths:
+    def _filtered(self, image: Depths) -> Depths:
         """Return one ``(H, W, 3)`` image of numbers from 0 to 255."""
-        if min(image.shape[:2]) < 2 * _COARSEST_PIXELS:
+        height, width = image.shape[:2]
+        if min(height, width) < 2 * _COARSEST_PIXELS:
             return image
-        size = image.shape[1], image.shape[0]
-        coarse = np.asarray(cv2.pyrDown(image), np.float32)
-        mean = cv2.pyrUp(coarse, dstsize=size)
+        half = (width + 1) // 2, (height + 1) // 2
+        coarse = cv2.resize(image, half, interpolation=cv2.INTER_AREA)
+        mean = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
         band = image - mean
         power = cv2.GaussianBlur(np.square(band).mean(axis=2), (0, 0), _AROUND_PIXELS)
-        contrast = np.sqrt(2.0 * power) / np.maximum(mean.mean(axis=2), 1.0)
-        left = -np.expm1(-((contrast / self.threshold) ** _STEEPNESS))
-        around = cv2.pyrUp(self._faded(coarse), dstsize=size)
-        faded: Depths = around + left[..., None] * band
-        return faded
+        contrast = np.sqrt(2.0 * power) / (_SHARE * np.maximum(mean.mean(axis=2), 1.0))
+        seen = -np.expm1(-((contrast / self.threshold) ** _STEEPNESS))
+        coarse = self._filtered(np.asarray(coarse, np.float32))
+        around = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
+        filtered: Depths = around + seen[..., None] * band
+        return filtered
 
 
 @dataclass(frozen=True)
@@ -316,20 +320,21 @@ class InfantVision:
 
     age_months: float
     _blur: Blur = field(init=False, repr=False)
-    _faint: FaintContrast = field(init=False, repr=False)
+    _contrast: ContrastThreshold = field(init=False, repr=False)
     _colours: NDArray[np.float64] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.age_months < math.inf:
             raise ValueError(f"age_months {self.age_months} must be finite and not negative")
         object.__setattr__(self, "_blur", Blur(acuity_blur_deg(acuity_cpd(self.age_months))))
-        object.__setattr__(self, "_faint", FaintContrast(contrast_threshold(self.age_months)))
+        threshold = contrast_threshold(self.age_months)
+        object.__setattr__(self, "_contrast", ContrastThreshold(threshold))
         object.__setattr__(self, "_colours", colour_matrix(*colour_gains(self.age_months)))
 
     def __call__(self, images: Images, context: FilterContext) -> Images:
         """Return blurred images of reduced contrast and saturation."""
         # of what is there: after the blur, the finest detail that is resolved would be too faint
-        out = self._blur(self._faint(images, context), context)
+        out = self._blur(self._contrast(images, context), context)
         for image in out:
             cv2.transform(image, self._colours, dst=image)
         return out
