@@ -8,6 +8,8 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+import torch
+from batches import leaves
 from breakable import relayed
 from refusals import naming
 from rollouts import digest, play
@@ -17,6 +19,7 @@ from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.remote.channel import RemoteError
 from veca_marl.remote.client import RemoteWorlds
 from veca_marl.remote.games import RemoteHost
+from veca_marl.remote.messages import decode
 
 NO_ACTION = np.zeros(2, np.float32)
 
@@ -50,6 +53,41 @@ def test_a_connection_that_breaks_and_comes_back_changes_no_byte(cfg, server):
                 breaking.join()
         with closing(VecaEnv(cfg, 2)) as here:
             assert found == digest(play(here, 30, seed=2))
+
+
+@pytest.mark.parametrize("part", [0, 1])
+def test_parts_of_a_result_that_are_lost_are_sent_again(cfg, server, monkeypatch, part):
+    send, lost = server._send, set()
+
+    def lose_once(client, frames):
+        answer = decode(frames, 1_000_000)
+        if answer.fields.get("part") == part and answer.number not in lost:
+            lost.add(answer.number)
+            return True
+        return send(client, frames)
+
+    monkeypatch.setattr(server, "_send", lose_once)
+    with closing(torchrl_env(server, 3)) as env:
+        found = digest(play(env, 2, seed=2))
+    assert len(lost) >= 3
+    with closing(VecaEnv(cfg, 3)) as here:
+        assert found == digest(play(here, 2, seed=2))
+
+
+def test_a_client_that_was_interrupted_between_parts_goes_on(cfg, server, monkeypatch):
+    with closing(torchrl_env(server, 3, seed=3)) as there, closing(VecaEnv(cfg, 3, 3)) as here:
+        state = there.rand_action(there.reset())
+        here.reset()
+        with monkeypatch.context() as patch:
+            patch.setattr(there, "_score", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                there.step(state)
+        ours, theirs = leaves(there.reset()), leaves(here.reset())
+        assert all(torch.equal(value, theirs[key]) for key, value in ours.items())
+
+
+def interrupted(*_):
+    raise KeyboardInterrupt
 
 
 @pytest.mark.slow

@@ -133,6 +133,21 @@ def test_arrays_of_another_size_are_refused(specs):
                 env.reset()
 
 
+@pytest.mark.parametrize("part", [-1, 2, "0", None, 2**60])
+def test_parts_that_no_result_has_are_refused(specs, part):
+    size = layouts.outcome_type(specs).itemsize
+
+    def answer(request):
+        fields = {"hello": welcome(specs), "open": {}}.get(request.kind, {"part": part})
+        return Message("done", request.number, fields, bytes(size)).frames()
+
+    with impostor(answer) as address:
+        there = RemoteWorlds(address, timeout_s=5.0)
+        env = VecaEnv(there.cfg, 2, 0, host=RemoteHost(there))
+        with closing(env), pytest.raises(RemoteError, match=naming("part", address)):
+            env.reset()
+
+
 def test_arrays_larger_than_the_specs_allow_are_not_read(specs):
     def answer(request):
         if request.kind == "hello":
@@ -158,7 +173,7 @@ def test_numbers_of_any_bits_are_taken_as_they_are(specs):
 
     with impostor(answer) as address:
         there = RemoteWorlds(address, timeout_s=5.0)
-        env = VecaEnv(there.cfg, 2, 0, host=RemoteHost(there))
+        env = VecaEnv(there.cfg, 1, 0, host=RemoteHost(there))
         with closing(env), np.errstate(over="ignore", invalid="ignore"):
             env.rollout(3, break_when_any_done=False)
 

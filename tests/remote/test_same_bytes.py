@@ -19,6 +19,7 @@ from veca_marl.envs.adapters.gymnasium import VecaGymEnv
 from veca_marl.envs.adapters.pettingzoo import VecaParallelEnv
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.rendering import CameraKind
+from veca_marl.remote import layouts
 
 
 def same(found, expected):
@@ -43,6 +44,14 @@ def test_resets_seeds_and_episodes_by_number_are_the_same(cfg, server, seed):
             lambda env: (env.set_seed(5), env.reset())[1],
         ):
             same(begin(there), begin(here))
+
+
+@pytest.mark.parametrize("worlds", [1, 2, 3, 7, 16, 1000])
+def test_parts_of_a_result_are_all_rows_in_their_order_and_the_last_is_one(worlds):
+    parts = list(layouts.parts(worlds))
+    assert [row for rows in parts for row in rows] == list(range(worlds))
+    assert len(parts[-1]) == 1
+    assert len(parts) <= 2 + np.log2(worlds)
 
 
 def test_a_seed_without_end_is_refused(server):

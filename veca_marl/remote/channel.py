@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -22,10 +23,13 @@ from veca_marl.remote.messages import (
     CALL,
     DONE,
     LARGEST_ANSWER_HEADER,
+    PART,
+    PART_NUMBER,
     REFUSED,
     Message,
     ProtocolError,
     decode,
+    integer,
     text,
 )
 
@@ -99,16 +103,30 @@ class Channel:
             RuntimeError: If the server says that the call is not possible now.
             RemoteError: If it does not answer, does not serve this client, or has lost its worlds.
         """
+        (answer,) = self.ask_for_parts(1, kind, fields or {}, data)
+        return answer
+
+    def ask_for_parts(
+        self, parts: int, kind: str, fields: dict[str, Any], data: Any
+    ) -> Iterator[Message]:
+        """Send a request whose result has several parts; yield them as they come, in their order.
+
+        Raises:
+            ValueError, RuntimeError, RemoteError: See `ask`.
+        """
         if self._socket.closed:
             raise RemoteError(f"the connection to {self._address} is closed; connect again")
         self._number += 1
-        frames = Message(kind, self._number, fields or {}, data).frames()
+        frames = Message(kind, self._number, fields, data).frames()
         self._heard = time.monotonic()
+        part = 0
         while True:
             self._send(frames)
-            answer = self._answer(time.monotonic() + RESEND_S)
-            if answer is not None:
-                return self._result(answer)
+            while answer := self._answer(part, parts, time.monotonic() + RESEND_S):
+                yield self._result(answer)
+                part += 1
+                if part == parts:
+                    return
             if time.monotonic() - self._heard > self._timeout_s:
                 raise RemoteError(self._silence())
 
@@ -118,8 +136,12 @@ class Channel:
             self._socket.send_multipart(frames, zmq.NOBLOCK)
         self._whole = True
 
-    def _answer(self, until: float) -> Message | None:
-        """Return what the server answers to the present request; None if it has not by then."""
+    def _answer(self, part: int, parts: int, until: float) -> Message | None:
+        """Return a part of what the server answers to the present request, or its refusal.
+
+        Returns:
+            The answer; None if it has not come by then, or was lost, since a later part comes.
+        """
         while time.monotonic() < until:
             self._note_events()
             if self._monitor is not None and not self._socket.poll(_LOOK_MS):
@@ -130,13 +152,19 @@ class Channel:
                 continue
             try:
                 message = decode([frame.buffer for frame in frames], LARGEST_ANSWER_HEADER)
+                self._stop_monitor()
+                if message.number != self._number:  # of an earlier request, or a probe
+                    continue
+                self._heard = time.monotonic()
+                if message.kind == REFUSED:
+                    return message
+                if message.kind not in (DONE, PART):  # the server is working on it
+                    continue
+                come = integer({PART_NUMBER: 0} | message.fields, PART_NUMBER, 0, parts - 1)
             except ProtocolError as error:
                 raise RemoteError(f"{self._address}: {error}") from None
-            self._stop_monitor()
-            if message.number == self._number:  # others answer earlier requests, or are probes
-                self._heard = time.monotonic()
-                if message.kind in (DONE, REFUSED):
-                    return message
+            if come >= part:  # earlier ones are sent again together with one that was lost
+                return message if come == part else None
         return None
 
     def _note_events(self) -> None:
@@ -159,7 +187,7 @@ class Channel:
             self._monitor = None
 
     def _result(self, answer: Message) -> Message:
-        if answer.kind == DONE:
+        if answer.kind != REFUSED:
             return answer
         try:
             reason = text(answer.fields, "reason")

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,17 +117,20 @@ class RemoteWorlds:
             self.close()
             raise
 
-    def reset(self, worlds: Sequence[int], rngs: Sequence[np.random.Generator]) -> Records:
-        """Begin an episode in each of some worlds; return a record for each."""
+    def reset(
+        self, worlds: Sequence[int], rngs: Sequence[np.random.Generator]
+    ) -> Iterator[Records]:
+        """Begin an episode in each of some worlds; yield records, in their order, as they come."""
         seeds = [seed_words(rng) for rng in rngs]
-        answer = self._open.ask(RESET, {"worlds": list(worlds), "seeds": seeds})
-        return self._records(answer, len(worlds))
+        fields = {"worlds": list(worlds), "seeds": seeds}
+        return self._records(RESET, fields, b"", len(worlds))
 
-    def step(self, worlds: Sequence[int], actions: Records, kinds: Sequence[str]) -> Records:
-        """Play one step in each of some worlds; return a record for each."""
+    def step(
+        self, worlds: Sequence[int], actions: Records, kinds: Sequence[str]
+    ) -> Iterator[Records]:
+        """Play one step in each of some worlds; yield records, in their order, as they come."""
         fields = {"worlds": list(worlds), "kinds": list(kinds)}
-        answer = self._open.ask(STEP, fields, actions.tobytes())
-        return self._records(answer, len(worlds))
+        return self._records(STEP, fields, actions.tobytes(), len(worlds))
 
     def state(self, world: int) -> NDArray[np.float32]:
         """Return the state of a world."""
@@ -156,11 +160,16 @@ class RemoteWorlds:
         assert self._channel is not None  # a host opens worlds before it plays in them
         return self._channel
 
-    def _records(self, answer: Message, worlds: int) -> Records:
-        try:
-            return layouts.records(answer.data, self._record, worlds)
-        except ProtocolError as error:
-            raise RemoteError(f"{self._address}: {error}") from None
+    def _records(
+        self, kind: str, fields: dict[str, Any], data: bytes, worlds: int
+    ) -> Iterator[Records]:
+        parts = list(layouts.parts(worlds))
+        answers = self._open.ask_for_parts(len(parts), kind, fields, data)
+        for rows, answer in zip(parts, answers, strict=True):
+            try:
+                yield layouts.records(answer.data, self._record, len(rows))
+            except ProtocolError as error:
+                raise RemoteError(f"{self._address}: {error}") from None
 
     def close(self) -> None:
         """End the worlds; further calls have no effect."""

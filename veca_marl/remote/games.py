@@ -6,7 +6,7 @@ them, and one message carries those of all worlds that step.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NoReturn, Protocol, cast
@@ -35,11 +35,15 @@ class Worlds(Protocol):
     def open(self, worlds: int) -> None:
         """Let the server build worlds."""
 
-    def reset(self, worlds: Sequence[int], rngs: Sequence[np.random.Generator]) -> Records:
-        """Begin an episode in each of some worlds; return a record for each."""
+    def reset(
+        self, worlds: Sequence[int], rngs: Sequence[np.random.Generator]
+    ) -> Iterator[Records]:
+        """Begin an episode in each of some worlds; yield records, in their order, as they come."""
 
-    def step(self, worlds: Sequence[int], actions: Records, kinds: Sequence[str]) -> Records:
-        """Play one step in each of some worlds; return a record for each."""
+    def step(
+        self, worlds: Sequence[int], actions: Records, kinds: Sequence[str]
+    ) -> Iterator[Records]:
+        """Play one step in each of some worlds; yield records, in their order, as they come."""
 
     def state(self, world: int) -> NDArray[np.float32]:
         """Return the state of a world."""
@@ -195,7 +199,7 @@ class RemoteGame(Game):
 
     def reset(self, rng: np.random.Generator) -> None:
         """See `Game.reset`."""
-        self.begun(rng, _Results(self._worlds.reset([self.index], [rng])), 0)
+        begin([self], [rng], self._worlds)
 
     def begun(self, rng: np.random.Generator, results: _Results, row: int) -> None:
         """Take what the server has returned for the start of an episode."""
@@ -272,8 +276,21 @@ class RemoteGame(Game):
         self._worlds.close()
 
 
+def begin(games: Sequence[RemoteGame], rngs: Sequence[np.random.Generator], worlds: Worlds) -> None:
+    """Begin an episode in each of some games."""
+    if not games:
+        return
+    parts = worlds.reset([game.index for game in games], rngs)
+    for game, rng, (results, row) in zip(games, rngs, _rows(parts), strict=True):
+        game.begun(rng, results, row)
+
+
 def advance(games: Sequence[RemoteGame], worlds: Worlds) -> Iterator[Outcome]:
-    """Play one step in each of some games, whose actions are set; one message carries them."""
+    """Play one step in each of some games, whose actions are set; one message carries them.
+
+    Yields:
+        Outcomes, as they come: further worlds are simulated while an outcome is made use of.
+    """
     if not games:
         return
     layout = games[0].layout
@@ -285,9 +302,17 @@ def advance(games: Sequence[RemoteGame], worlds: Worlds) -> Iterator[Outcome]:
         field = actions[name]
         for row, part in enumerate(column):
             field[row] = part
-    results = _Results(worlds.step([game.index for game in games], actions, kinds))
-    for row, game in enumerate(games):
+    parts = worlds.step([game.index for game in games], actions, kinds)
+    for game, (results, row) in zip(games, _rows(parts), strict=True):
         yield game.stepped(results, row)
+
+
+def _rows(parts: Iterable[Records]) -> Iterator[tuple[_Results, int]]:
+    """Yield each row of some parts: the results that it is in, and its index there."""
+    for part in parts:
+        results = _Results(part)
+        for row in range(len(part)):
+            yield results, row
 
 
 class _RemoteState:
@@ -335,16 +360,10 @@ class RemoteHost(Host):
 
     def reset(self, games: Sequence[Game], rngs: Sequence[np.random.Generator]) -> None:
         """See `Host`."""
-        if not games:
-            return
-        remote = _remote(games)
-        records = self._worlds.reset([game.index for game in remote], rngs)
-        results = _Results(records)
-        for row, (game, rng) in enumerate(zip(remote, rngs, strict=True)):
-            game.begun(rng, results, row)
+        begin(_remote(games), rngs, self._worlds)
 
     def advance(self, games: Sequence[Game]) -> Iterator[Outcome]:
-        """See `Host`; all worlds are stepped before the first outcome."""
+        """See `Host`; all worlds begin their step before the first outcome."""
         return advance(_remote(games), self._worlds)
 
     def state(self, game: Game) -> _RemoteState:

@@ -6,7 +6,7 @@ in it is a pointer, a length or a type. Numbers are little-endian.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +57,19 @@ def outcome_fields(specs: GameSpecs) -> list[PlayerFields]:
         )
         for index, player in enumerate(specs.players)
     ]
+
+
+def parts(worlds: int) -> Iterator[range]:
+    """Yield the rows of each part of a result for some worlds.
+
+    A part has half of the rows that are left: a client reads it while the next worlds are
+    simulated, and of the last one waits for a single record.
+    """
+    first = 0
+    while first < worlds:
+        end = first + (worlds - first + 1) // 2
+        yield range(first, end)
+        first = end
 
 
 def columns(block: Records) -> Columns:

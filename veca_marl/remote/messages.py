@@ -16,7 +16,7 @@ from typing import Any
 
 import msgpack
 
-PROTOCOL = 1
+PROTOCOL = 2
 """Number of this form of messages; a peer with another one is refused."""
 _NAME = b"veca_marl "
 MARK = _NAME + str(PROTOCOL).encode()
@@ -40,8 +40,11 @@ HELLO, OPEN, RESET, STEP, STATE, VIEW, CLOSE = (
 )
 """Kinds of requests, for specs, worlds, episodes, steps, the state, a picture, and the end."""
 REQUESTS = (HELLO, OPEN, RESET, STEP, STATE, VIEW, CLOSE)
-DONE, REFUSED, WORKING, PROBE = "done", "refused", "working", "probe"
-"""Kinds of answers, which are a result, an error, that there is work on it, and nothing."""
+DONE, PART, REFUSED, WORKING, PROBE = "done", "part", "refused", "working", "probe"
+"""Kinds of answers, which are a result or the last part of one, another part of it, an error, that
+there is work on it, and nothing."""
+PART_NUMBER = "part"
+"""Field with the number of a part of a result; without it, the result has one part."""
 
 ACTION, CALL, ENDED, PEER = "action", "call", "ended", "peer"
 """Reasons of refusals, which are an invalid action, a call at the wrong time, worlds that are no

@@ -35,6 +35,7 @@ from veca_marl.remote.messages import (
     LARGEST_ANSWER_HEADER,
     LARGEST_REQUEST_HEADER,
     OPEN,
+    PART,
     PEER,
     PROBE,
     REQUESTS,
@@ -107,7 +108,8 @@ class _Session:
         line: The line to it.
         built: Whether its worlds are built.
         number: Number of the last request.
-        answer: Frames of the answer to it; None while it is worked on.
+        answer: Frames of the messages that have answered it.
+        working: Whether more of them follow.
         since: When the work on it began.
         gone: When its connection was found to have ended; None while there is one.
         probed: When its connection was last checked.
@@ -120,7 +122,8 @@ class _Session:
     line: Line
     number: int
     built: bool = False
-    answer: list[Any] | None = None
+    answer: list[list[Any]] = field(default_factory=list)
+    working: bool = True
     since: float = field(default_factory=time.monotonic)
     gone: float | None = None
     probed: float = field(default_factory=time.monotonic)
@@ -323,15 +326,19 @@ class Server:
     def _next(self, session: _Session, request: Message, frames: list[Any]) -> Message | None:
         """Hand the next request on; answer one that is worked on, or was answered, as it stands."""
         if request.number == session.number:
-            if session.answer is None:
+            if session.working:
                 return Message(WORKING, request.number)
-            self._send(session.client, session.answer)
+            for frames in session.answer:
+                self._send(session.client, frames)
             return None
         if request.number < session.number:  # sent again before its answer came
             return None
-        if session.answer is None or request.kind == OPEN:
-            return refusal(request.number, PEER, f"{request.kind} came before its turn")
-        session.number, session.answer, session.since = request.number, None, time.monotonic()
+        if request.kind == OPEN:
+            return refusal(request.number, PEER, "this client has worlds already")
+        if session.working:  # its client was interrupted while it waited; it will send this again
+            return Message(WORKING, request.number)
+        session.number, session.since = request.number, time.monotonic()
+        session.answer, session.working = [], True
         try:
             session.line.send(frames[1].buffer, frames[2].buffer if len(frames) == 3 else b"")
         except BrokenLineError as error:
@@ -356,7 +363,7 @@ class Server:
     # ---- worlds
 
     def _from_worlds(self, session: _Session) -> None:
-        """Hand the answer of a process on to its client, when it is complete."""
+        """Hand a message of a process on to its client, when it is complete."""
         try:
             parts = session.line.receive()
         except BrokenLineError:
@@ -365,16 +372,19 @@ class Server:
             return
         if parts is None:
             return
+        answer = decode_parts(*parts, LARGEST_ANSWER_HEADER)
         if session.built:
-            session.answer = as_frames(*parts)
-            self._send(session.client, session.answer)
+            self._answer(session, as_frames(*parts), answer.kind != PART)
             return
-        built = decode_parts(*parts, LARGEST_ANSWER_HEADER)
-        session.answer = replace(built, number=session.number).frames()
-        self._send(session.client, session.answer)
-        session.built = built.kind == DONE
+        self._answer(session, replace(answer, number=session.number).frames(), True)
+        session.built = answer.kind == DONE
         if not session.built:
-            self._end(session, text(built.fields, "message", 2000))
+            self._end(session, text(answer.fields, "message", 2000))
+
+    def _answer(self, session: _Session, frames: list[Any], is_last: bool) -> None:
+        session.answer.append(frames)
+        session.working = not is_last
+        self._send(session.client, frames)
 
     def _check_sessions(self) -> None:
         """End worlds whose process has ended, takes too long, or whose client is gone."""
@@ -382,7 +392,7 @@ class Server:
         for session in list(self._sessions.values()):
             if session.process.exitcode is not None:
                 self._end(session, f"their process {end_of(session.process.exitcode)}")
-            elif session.answer is None and now - session.since > self._cfg.limit_s:
+            elif session.working and now - session.since > self._cfg.limit_s:
                 self._end(session, f"a request took longer than {self._cfg.limit_s:g} s (limit_s)")
             elif session.gone is not None or now - session.probed > _PROBE_S:
                 session.probed = now
@@ -408,7 +418,7 @@ class Server:
         session.line.close()
         _LOG.info("client %d: its worlds have ended: %s", session.name, reason)
         # the answer to the present request, or to the next one, which the server may not see
-        number = session.number + (session.answer is not None)
+        number = session.number + (not session.working)
         lost = f"the worlds of this client are gone: {reason}"
         self._send(session.client, refusal(number, ENDED, lost).frames())
         session.process.kill()

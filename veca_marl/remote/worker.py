@@ -7,7 +7,7 @@ are checked before anything moves. An error of a request is an answer; the world
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -29,6 +29,8 @@ from veca_marl.remote.messages import (
     CALL,
     DONE,
     LARGEST_REQUEST_HEADER,
+    PART,
+    PART_NUMBER,
     PEER,
     REFUSED,
     RESET,
@@ -78,25 +80,28 @@ class WorldServer:
         self._blocks: dict[int, tuple[layouts.Records, layouts.Columns]] = {}
         self._states = [GlobalState(game) for game in self._games]
         self._spectators = [Spectator(game) for game in self._games]
-        self._answers: dict[str, Callable[[Message], Message]] = {
+        self._answers: dict[str, Callable[[Message], Iterator[Message]]] = {
             RESET: self._reset,
             STEP: self._step,
             STATE: self._state,
             VIEW: self._view,
         }
 
-    def answer(self, request: Message) -> Message:
-        """Return the answer to a request: what it asked for, or why it is refused."""
+    def answers(self, request: Message) -> Iterator[Message]:
+        """Yield the answer to a request: the parts of its result, or why it is refused.
+
+        A part is to be sent before the next one is asked for.
+        """
         try:
             if request.kind not in self._answers:
                 raise ProtocolError(f"there is no request {shown(request.kind)} to worlds")
-            return self._answers[request.kind](request)
+            yield from self._answers[request.kind](request)
         except ProtocolError as error:
-            return refusal(request.number, PEER, str(error))
+            yield refusal(request.number, PEER, str(error))
         except ValueError as error:
-            return refusal(request.number, ACTION, str(error))
+            yield refusal(request.number, ACTION, str(error))
         except Exception as error:  # of a task of users too: the client has to learn of it
-            return refusal(request.number, CALL, f"{type(error).__name__}: {error}")
+            yield refusal(request.number, CALL, f"{type(error).__name__}: {error}")
 
     def _worlds(self, request: Message) -> list[int]:
         """Return the worlds that a request is about, each once."""
@@ -121,33 +126,53 @@ class WorldServer:
             self._blocks[worlds][0].view(np.uint8).fill(0)
         return self._blocks[worlds]
 
-    def _reset(self, request: Message) -> Message:
+    def _in_parts(
+        self, request: Message, worlds: list[int], play: Callable[[layouts.Columns, int], None]
+    ) -> Iterator[Message]:
+        """Play in some worlds; yield parts of the result, each when its rows are written.
+
+        Args:
+            request: What is answered.
+            worlds: The worlds.
+            play: Plays in the world of a row, and writes that row of the given columns.
+        """
+        records, columns = self._block(len(worlds))
+        for number, rows in enumerate(layouts.parts(len(worlds))):
+            for row in rows:
+                play(columns, row)
+            kind = DONE if rows.stop == len(worlds) else PART
+            data: Any = records[rows.start : rows.stop].view(np.uint8)
+            yield Message(kind, request.number, {PART_NUMBER: number}, memoryview(data))
+
+    def _reset(self, request: Message) -> Iterator[Message]:
         worlds = self._worlds(request)
         seeds = entries(request.fields, "seeds", len(worlds))
         if len(seeds) != len(worlds):
             raise ProtocolError(f"{len(seeds)} seeds for {len(worlds)} worlds")
         generators = [_generator(seed) for seed in seeds]
-        records, columns = self._block(len(worlds))
-        for row, (world, rng) in enumerate(zip(worlds, generators, strict=True)):
-            self._games[world].reset(rng)
-            self._write(columns, row, world, frozenset())
-        return Message(DONE, request.number, data=_bytes(records))
 
-    def _step(self, request: Message) -> Message:
+        def begin(columns: layouts.Columns, row: int) -> None:
+            self._games[worlds[row]].reset(generators[row])
+            self._write(columns, row, worlds[row], frozenset())
+
+        yield from self._in_parts(request, worlds, begin)
+
+    def _step(self, request: Message) -> Iterator[Message]:
         worlds = self._worlds(request)
         kinds = entries(request.fields, "kinds", len(self._actions.kinds))
         record = self._actions.record([kind for kind in kinds if type(kind) is str])
         actions = layouts.columns(layouts.records(request.data, record, len(worlds)))
         for row, world in enumerate(worlds):
             self._command(world, actions, row)
-        records, columns = self._block(len(worlds))
-        for row, world in enumerate(worlds):
-            game = self._games[world]
+
+        def advance(columns: layouts.Columns, row: int) -> None:
+            game = self._games[worlds[row]]
             eliminated = game.eliminated
             outcome = game.advance()
-            self._write(columns, row, world, eliminated)
-            self._score(columns, row, world, outcome)
-        return Message(DONE, request.number, data=_bytes(records))
+            self._write(columns, row, worlds[row], eliminated)
+            self._score(columns, row, worlds[row], outcome)
+
+        yield from self._in_parts(request, worlds, advance)
 
     def _command(self, world: int, actions: layouts.Columns, row: int) -> None:
         given = {
@@ -187,15 +212,15 @@ class WorldServer:
             if outcome.solved:
                 columns[layouts.SOLVED][row, index] = outcome.solved[player.name]
 
-    def _state(self, request: Message) -> Message:
+    def _state(self, request: Message) -> Iterator[Message]:
         (world,) = self._one(request)
-        return Message(DONE, request.number, data=self._states[world].read().tobytes())
+        yield Message(DONE, request.number, data=self._states[world].read().tobytes())
 
-    def _view(self, request: Message) -> Message:
+    def _view(self, request: Message) -> Iterator[Message]:
         (world,) = self._one(request)
         picture = self._spectators[world].frame(**pictures.choices_of(request.fields))
         fields = {"shape": list(picture.shape)}
-        return Message(DONE, request.number, fields, np.ascontiguousarray(picture).tobytes())
+        yield Message(DONE, request.number, fields, np.ascontiguousarray(picture).tobytes())
 
     def _one(self, request: Message) -> Sequence[int]:
         worlds = self._worlds(request)
@@ -241,10 +266,6 @@ def _generator(words: Any) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(numbers))
 
 
-def _bytes(records: Any) -> memoryview:
-    return memoryview(records.view(np.uint8))
-
-
 def serve_worlds(connection: Connection[Any, Any], cfg: WorldsCfg, worlds: int) -> None:
     """Build worlds and answer requests until this process is ended.
 
@@ -265,11 +286,14 @@ def serve_worlds(connection: Connection[Any, Any], cfg: WorldsCfg, worlds: int) 
     line.send(*Message(DONE).parts())
     with suppress(EOFError, ConnectionError):  # the server has ended
         while True:
-            line.send(*_answer(server, *line.receive()).parts())
+            for answer in _answers(server, *line.receive()):
+                line.send(*answer.parts())
 
 
-def _answer(server: WorldServer, header: bytes, data: bytes) -> Message:
+def _answers(server: WorldServer, header: bytes, data: bytes) -> Iterator[Message]:
     try:
-        return server.answer(decode_parts(header, data, LARGEST_REQUEST_HEADER))
+        request = decode_parts(header, data, LARGEST_REQUEST_HEADER)
     except ProtocolError as error:
-        return refusal(0, PEER, str(error))
+        yield refusal(0, PEER, str(error))
+    else:
+        yield from server.answers(request)
