@@ -232,9 +232,17 @@ def add_silhouette(
         Distance of its middle along the line, and infinity if nothing of it is there.
     """
     corners, extent, detour = work.corners, work.extent, work.detour
-    reach = _write_corners(line, screens, number, mirror, corners)
+    # most screens are in front of the planes or behind them: their other corners are not needed
+    centre_m, half_m = _write_corners(line, screens, number, mirror, 0, corners)
+    reach = centre_m - half_m, centre_m + half_m
     begin_m, end_m = max(begin_m, reach[0]), min(end_m, reach[1])
-    if end_m - begin_m < 1e-9 or reach[2] > max(_FAR_M, _FAR_RATIO * line.length_m):
+    if end_m - begin_m < 1e-9:
+        return np.inf
+    beside_m = -np.inf
+    for row in range(1, 3):
+        centre_m, half_m = _write_corners(line, screens, number, mirror, row, corners)
+        beside_m = max(beside_m, abs(centre_m) - half_m)
+    if beside_m > max(_FAR_M, _FAR_RATIO * line.length_m):
         return np.inf
     for side in range(4):
         extent[side] = detour[side] = np.inf if side % 2 == 0 else -np.inf
@@ -257,35 +265,42 @@ def add_silhouette(
 
 @kernel
 def _write_corners(
-    line: Line, screens: Screens, number: int, mirror: tuple[Floats, Floats], corners: Floats
-) -> tuple[float, float, float]:
-    """Write the corners of a screen in a line's frame, ``(8, 3)`` metres.
+    line: Line,
+    screens: Screens,
+    number: int,
+    mirror: tuple[Floats, Floats],
+    row: int,
+    corners: Floats,
+) -> tuple[float, float]:
+    """Write one coordinate of the corners of a screen in a line's frame, metres.
+
+    Args:
+        line: The line.
+        screens: All screens.
+        number: Which of them.
+        mirror: See `add_silhouette`.
+        row: Which coordinate, a row of `Line.frame`.
+        corners: ``(8, 3)``; one column is overwritten.
 
     Returns:
-        Least and greatest distance along the line, and how far it is beside or above it at least.
+        That coordinate of its centre, and by how much the corners differ from it at most.
     """
-    least, most, beside = 0.0, 0.0, -np.inf
-    for row in range(3):
-        centre, reach = 0.0, 0.0
+    centre, reach = 0.0, 0.0
+    for axis in range(3):
+        at = mirror[0][axis] * screens.centres[number, axis] + mirror[1][axis]
+        centre += line.frame[row, axis] * (at - line.start[axis])
+    corners[0, row] = centre
+    for k in range(3):
+        edge = 0.0
         for axis in range(3):
-            at = mirror[0][axis] * screens.centres[number, axis] + mirror[1][axis]
-            centre += line.frame[row, axis] * (at - line.start[axis])
-        corners[0, row] = centre
-        for k in range(3):
-            edge = 0.0
-            for axis in range(3):
-                turned = mirror[0][axis] * screens.rotations[number, axis, k]
-                edge += line.frame[row, axis] * turned * screens.halves[number, k]
-            reach += abs(edge)
-            n = 1 << k
-            for corner in range(n):
-                corners[corner + n, row] = corners[corner, row] + edge
-                corners[corner, row] -= edge
-        if row == 0:
-            least, most = centre - reach, centre + reach
-        else:
-            beside = max(beside, abs(centre) - reach)
-    return least, most, beside
+            turned = mirror[0][axis] * screens.rotations[number, axis, k]
+            edge += line.frame[row, axis] * turned * screens.halves[number, k]
+        reach += abs(edge)
+        n = 1 << k
+        for corner in range(n):
+            corners[corner + n, row] = corners[corner, row] + edge
+            corners[corner, row] -= edge
+    return centre, reach
 
 
 @kernel

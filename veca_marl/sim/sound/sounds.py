@@ -10,10 +10,10 @@ from enum import Enum
 from typing import Protocol
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike
 
 from veca_marl.sim.geometry import Floats
+from veca_marl.sim.kernels import kernel
 from veca_marl.sim.sound.signal_paths import SignalMemory
 from veca_marl.sim.sound.waveforms import (
     SAMPLE_RATE_HZ,
@@ -91,28 +91,62 @@ class Clip:
         return rest if rest.size == n_samples else np.pad(rest, (0, n_samples - rest.size))
 
 
+class _HighPass:
+    """The high-pass of all sounds, see `waveforms.high_pass`, over samples that come in parts.
+
+    Attributes:
+        state: ``(n_sections, 2)``; all zeros where it emits nothing of earlier samples.
+    """
+
+    def __init__(self, sample_rate_hz: float) -> None:
+        self._sections = high_pass(sample_rate_hz)
+        self.state = np.zeros((len(self._sections), 2))
+
+    def __call__(self, samples: Floats) -> Samples:
+        """Return the next samples ``(n,)``."""
+        filtered = np.empty(samples.size, np.float32)
+        _filter_sections(self._sections, samples, self.state, filtered)
+        return filtered
+
+
+@kernel
+def _filter_sections(sections: Floats, samples: Floats, state: Floats, out: Samples) -> None:
+    """Filter by sections of second order in cascade, as `scipy.signal.sosfilt`, in direct form II.
+
+    Args:
+        sections: ``(S, 6)``.
+        samples: ``(n,)``.
+        state: ``(S, 2)``, overwritten.
+        out: ``(n,)``, overwritten.
+    """
+    for i in range(len(samples)):
+        value = samples[i]
+        for s in range(len(sections)):
+            filtered = sections[s, 0] * value + state[s, 0]
+            state[s, 0] = sections[s, 1] * value - sections[s, 4] * filtered + state[s, 1]
+            state[s, 1] = sections[s, 2] * value - sections[s, 5] * filtered
+            value = filtered
+        out[i] = np.float32(value)
+
+
 class Noise:
     """White Gaussian noise, independent for every sample."""
 
     def __init__(self, level: float, sample_rate_hz: float) -> None:
         self.level = check_level(level)
-        self._high_pass = high_pass(sample_rate_hz)
+        self._high_pass = _HighPass(sample_rate_hz)
         self._rng: np.random.Generator | None = None
-        self._state = np.zeros((self._high_pass.shape[0], 2))
 
     def reset(self, rng: np.random.Generator) -> None:
         """See `Sound`."""
         self._rng = np.random.default_rng(rng.integers(2**63))
-        self._state[:] = 0.0
+        self._high_pass.state[:] = 0.0
 
     def emit(self, n_samples: int) -> Samples:
         """See `Sound`."""
         if self._rng is None:
             raise RuntimeError("reset() the noise before emit(): it has no random generator yet")
-        white = self._rng.standard_normal(n_samples) * self.level
-        filtered, self._state = scipy.signal.sosfilt(self._high_pass, white, zi=self._state)
-        emitted: Samples = filtered.astype(np.float32)
-        return emitted
+        return self._high_pass(self._rng.standard_normal(n_samples) * self.level)
 
 
 class Pulses:
@@ -161,8 +195,7 @@ class Voice:
     """
 
     def __init__(self, sample_rate_hz: float = SAMPLE_RATE_HZ) -> None:
-        self._high_pass = high_pass(sample_rate_hz)
-        self._state = np.zeros((self._high_pass.shape[0], 2))
+        self._high_pass = _HighPass(sample_rate_hz)
         self._queue: deque[Floats] = deque()
 
     def say(self, waveform: ArrayLike) -> None:
@@ -187,19 +220,17 @@ class Voice:
     def reset(self, rng: np.random.Generator) -> None:
         """See `Sound`."""
         self.clear()
-        self._state[:] = 0.0
+        self._high_pass.state[:] = 0.0
 
     def emit(self, n_samples: int) -> Samples:
         """See `Sound`."""
-        if not self._queue and not self._state.any():
+        state = self._high_pass.state
+        if not self._queue and not state.any():
             return np.zeros(n_samples, np.float32)
-        filtered, self._state = scipy.signal.sosfilt(
-            self._high_pass, self._take(n_samples), zi=self._state
-        )
-        if np.abs(self._state).max() < _NEGLIGIBLE:
+        emitted = self._high_pass(self._take(n_samples))
+        if np.abs(state).max() < _NEGLIGIBLE:
             # exact silence: sources that emit zeros cost nothing
-            self._state[:] = 0.0
-        emitted: Samples = filtered.astype(np.float32)
+            state[:] = 0.0
         return emitted
 
     def _take(self, n_samples: int) -> Floats:
