@@ -20,6 +20,7 @@ from pathlib import Path
 import torch
 from tensordict.nn import TensorDictSequential
 from torch import nn
+from tqdm import tqdm
 
 from veca_marl.algos.checkpoints import CheckpointError
 from veca_marl.algos.evaluation.comparison import comparison_line, interval, solved_rate
@@ -143,10 +144,11 @@ def evaluate_run(options: EvaluateOptions, overrides: Sequence[str] = ()) -> Eva
     env = _make_env(cfg, episodes, seed)
     actors = stored_actors(cfg, checkpoint, team_specs(env))
     learnt = [team for team in actors if team not in cfg.frozen]
-    with closing(env):
+    total = episodes * (1 + len(learnt))
+    with closing(env), tqdm(total=total, unit="episode", disable=None) as bar:
 
         def play(policy: nn.Module) -> dict[str, Scores]:
-            return evaluate(env, policy, episodes, seed, exploration)
+            return evaluate(env, policy, episodes, seed, exploration, played=bar.update)
 
         table = {
             "policy": play(TensorDictSequential(*actors.values())),

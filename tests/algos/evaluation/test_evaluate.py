@@ -59,6 +59,12 @@ def test_the_result_does_not_depend_on_the_number_of_worlds(worlds):
     np.testing.assert_array_equal(whole.returns[4:], part.returns)
 
 
+def test_what_shows_the_progress_is_told_of_every_episode_once():
+    counts = []
+    evaluate(FakeEnv(3, horizon=6), oracle, 7, 0, DETERMINISTIC, played=counts.append)
+    assert counts == [3, 3, 1]
+
+
 def test_the_result_depends_on_the_seed_alone():
     def play(seed, used):
         env = FakeEnv(4)

@@ -104,6 +104,7 @@ def evaluate(
     seed: int,
     exploration: Exploration,
     first: int = 0,
+    played: Callable[[int], object] = lambda count: None,
 ) -> dict[str, Scores]:
     """Play whole episodes and return each team's scores, in the order of their numbers.
 
@@ -119,6 +120,7 @@ def evaluate(
         seed: Seed of the starts and of the samples.
         exploration: Whether actions are sampled.
         first: Number of the first episode.
+        played: Is told of episodes that have ended, how many.
     """
     worlds = env.batch_size[0]
     tallies = []
@@ -127,6 +129,7 @@ def evaluate(
             seed_episodes(env, seed, number)
             count = min(worlds, first + episodes - number)
             tallies.append(_play_one_each(env, policy, count))
+            played(count)
     return {team: _joined([tally.sums(team) for tally in tallies]) for team in env.group_map}
 
 
