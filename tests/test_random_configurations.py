@@ -5,8 +5,9 @@ import signal
 
 import pytest
 from random_configurations import draw, draw_changes, refusal, refusal_of_changes
+from refusals import naming
 
-from veca_marl.config import compose_node
+from veca_marl.config import ConfigError, compose_node
 from veca_marl.envs.tasks.floors.outlines import start_outline
 from veca_marl.sim.body.walker import WalkerCfg
 
@@ -62,6 +63,8 @@ FOUND = [
     (["+task=KickTheBall"], ["senses.audio.sofa_path=1e308"]),
     (["+task=GrabObject"], ["task.turn_deg=1e308"]),
     (["+task=MoveToTarget"], ["task.aside_m=-0.0"]),
+    (["+task=KickTheBall"], ["task.pause_s=1e308", "task.pulse_s=1e9"]),
+    (["+task=ChaseCar"], ["task.choices=1e9"]),
 ]
 """What soaks have found, each refused in one line now."""
 
@@ -73,6 +76,12 @@ def test_what_soaks_have_found_is_refused(presets, changes, time_limit):
         time_limit()
         assert refusal_of_changes(node, [change], 0) is not None
         assert refusal([*presets, change], 0) is not None
+
+
+def test_values_below_a_group_that_is_null_are_refused_with_both_words():
+    words = ["+task=PushOut2v2", "senses.touch=null", "senses.touch.receptive_field={a:1}"]
+    with pytest.raises(ConfigError, match=naming("senses.touch=null", "receptive_field")):
+        compose_node(words)
 
 
 def test_a_very_high_capsule_needs_little_memory():

@@ -198,7 +198,9 @@ with a number of 5000 digits ended in a traceback or in two lines; `senses.visio
 accepted and filled the memory of the machine (13.8 GB) until the system killed the process;
 `playground.walls={{a:1}}` of a stored run without walls, a name of a SOFA file that is too long,
 `task.turn_deg=1e308`, `task.aside_m=-0.0` and a capsule of 1e9 m ended in other errors;
-`clock.substeps=5000` was played, with minutes for a step of four joint-level bodies.
+`clock.substeps=5000` was played, with minutes for a step of four joint-level bodies;
+`task.pause_s=1e308`, `task.choices=1e9`, and a value below `senses.touch=null` ended in other
+errors or not at all.
 
 ## What is not covered
 

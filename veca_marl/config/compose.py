@@ -157,9 +157,26 @@ def _copies_of(root: str, overrides: tuple[str, ...], state: Hashable) -> Callab
 
 
 def _by_hydra(root: str, overrides: tuple[str, ...]) -> DictConfig:
+    _check_below_null(overrides)
     with _own_hydra():
         node: DictConfig = hydra.compose(root, overrides=list(overrides))
     return node
+
+
+def _check_below_null(overrides: Sequence[str]) -> None:
+    """Refuse a value below a group that an earlier word sets to null: OmegaConf asserts there.
+
+    Raises:
+        ConfigError: One line that names both.
+    """
+    nulls: list[str] = []
+    for text in overrides:
+        key, _, value = text.lstrip("+~").partition("=")
+        above = next((one for one in nulls if key.startswith(f"{one}.")), None)
+        if above is not None:
+            raise ConfigError(f"{key}: {above}=null leaves no values there")
+        if value.strip().lower() == "null":
+            nulls.append(key.strip())
 
 
 def prepare(overrides: Sequence[str]) -> list[str]:

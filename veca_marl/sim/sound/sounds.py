@@ -28,6 +28,7 @@ from veca_marl.sim.sound.waveforms import (
 )
 
 _RAMP_S = 0.005  # usual in psychoacoustics
+_LONGEST_S = 60.0  # of pulses and pauses, which are stored
 _NEGLIGIBLE = 1e-12  # pressure, -240 dB: the decay of the high-pass ends here
 
 
@@ -161,8 +162,8 @@ class Pulses:
         sample_rate_hz: Rate of the sound field.
 
     Raises:
-        ValueError: If a duration is not positive and finite, or a pulse is shorter than its ramps,
-            10 ms.
+        ValueError: If a duration is not positive or longer than a minute, or a pulse is shorter
+            than its ramps, 10 ms.
     """
 
     def __init__(
@@ -250,10 +251,10 @@ class Voice:
 def check_pulses(pulse_s: float, pause_s: float) -> None:
     """Raise `ValueError` if pulses of these durations cannot be made, see `Pulses`."""
     least_s = 2.0 * _RAMP_S
-    if not (least_s <= pulse_s < math.inf and 0.0 < pause_s < math.inf):
+    if not (least_s <= pulse_s <= _LONGEST_S and 0.0 < pause_s <= _LONGEST_S):
         raise ValueError(
-            f"pulse_s={pulse_s} must be finite and at least {least_s}, the duration of its ramps, "
-            f"and pause_s={pause_s} finite and positive"
+            f"pulse_s={pulse_s} must be at least {least_s}, the duration of its ramps, "
+            f"and pause_s={pause_s} positive, both at most {_LONGEST_S:g} s"
         )
 
 

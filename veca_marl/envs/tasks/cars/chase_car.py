@@ -12,6 +12,7 @@ from veca_marl.envs.tasks.cars.car_game import CarGame, CarGameCfg
 from veca_marl.sim.geometry import Floats, horizontal_distance
 
 PRESS = "press"
+_MOST_CHOICES = 1000
 
 
 @dataclass
@@ -22,7 +23,7 @@ class ChaseCarCfg(CarGameCfg):
         presses: How often the car has to be pressed.
         rest_s: Time after a press in which another one does not count.
         choices: The car drives to the one of so many random points that is farthest from the
-            player; with 1 it takes no notice of the player.
+            player, at most 1000; with 1 it takes no notice of the player.
     """
 
     max_seconds: float = 40.0
@@ -38,6 +39,8 @@ class ChaseCarCfg(CarGameCfg):
         for name in ("presses", "choices"):
             if getattr(self, name) < 1:
                 raise ValueError(f"task.{name}={getattr(self, name)} must be at least 1")
+        if self.choices > _MOST_CHOICES:
+            raise ValueError(f"task.choices={self.choices} must be at most {_MOST_CHOICES}")
 
 
 @register_task
