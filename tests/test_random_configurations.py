@@ -63,7 +63,7 @@ FOUND = [
     (["+task=KickTheBall"], ["senses.audio.sofa_path=1e308"]),
     (["+task=GrabObject"], ["task.turn_deg=1e308"]),
     (["+task=MoveToTarget"], ["task.aside_m=-0.0"]),
-    (["+task=KickTheBall"], ["task.pause_s=1e308", "task.pulse_s=1e9"]),
+    (["+task=KickTheBall"], ["task.pause_s=1e308", "task.pause_s=1e9"]),
     (["+task=ChaseCar"], ["task.choices=1e9"]),
 ]
 """What soaks have found, each refused in one line now."""
