@@ -16,7 +16,7 @@ from veca_marl.remote.channel import RemoteError
 from veca_marl.remote.client import RemoteWorlds
 from veca_marl.remote.description import GameSpecs
 from veca_marl.remote.games import RemoteHost
-from veca_marl.remote.messages import MARK, Message, decode
+from veca_marl.remote.messages import MARK, PROTOCOL, Message, decode
 from veca_marl.version import __version__
 
 
@@ -71,7 +71,7 @@ def expect_refusal(address, *named):
 
 def test_a_server_of_another_version_is_told_from_others():
     with impostor(lambda request: [b"veca_marl 7", b""]) as address:
-        expect_refusal(address, "7", "1")
+        expect_refusal(address, "7", str(PROTOCOL))
 
 
 @pytest.mark.parametrize(
