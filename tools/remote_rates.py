@@ -36,6 +36,7 @@ class RemoteRatesOptions:
         steps: Steps of each kind in a round.
         rounds: Number of rounds.
         encrypted: Whether the connection has keys.
+        busy_wait_s: Of the server.
     """
 
     task: str = "KickTheBall"
@@ -43,15 +44,17 @@ class RemoteRatesOptions:
     steps: int = 20
     rounds: int = 25
     encrypted: bool = True
+    busy_wait_s: float = 0.0005
 
 
 @contextmanager
-def served(task: str, worlds: int, encrypted: bool) -> Iterator[tuple[str, Path | None]]:
+def served(options: RemoteRatesOptions) -> Iterator[tuple[str, Path | None]]:
     """Serve a task at a free port of the loopback; yield the address and the file of keys."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "veca_marl.serve"]
-        words = [f"+task={task}", f"worlds={worlds}", "address=tcp://127.0.0.1:*"]
-        key = Path(folder, "keys", "client.key.json") if encrypted else None
+        words = [f"+task={options.task}", f"worlds={options.worlds}"]
+        words += ["address=tcp://127.0.0.1:*", f"busy_wait_s={options.busy_wait_s}"]
+        key = Path(folder, "keys", "client.key.json") if options.encrypted else None
         if key is not None:
             words.append(f"keys={key.parent}")
             subprocess.run([*command, f"keys={key.parent}", "new_client=client"], check=True)
@@ -152,7 +155,7 @@ def _seconds(play: Player) -> float:
 def run(options: RemoteRatesOptions, overrides: list[str]) -> None:
     """Measure and print."""
     torch.set_num_threads(1)
-    with served(options.task, options.worlds, options.encrypted) as (address, key):
+    with served(options) as (address, key):
         here: Any = gym_env(options.task, overrides=overrides)
         there: Any = connect(address, key=key, library="gymnasium")
         rounds, steps = options.rounds, options.steps

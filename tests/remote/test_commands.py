@@ -23,6 +23,7 @@ CHEAP = ["+task=KickTheBall", "playground=simple", "senses/vision=blind"]
         (["worlds=0"], ["worlds=0"]),
         (["clients=0"], ["clients=0"]),
         (["limit_s=0"], ["limit_s=0"]),
+        (["busy_wait_s=2"], ["busy_wait_s=2", "1"]),
         (["address=5555"], ["'5555'", "tcp://"]),
         (["address=tcp://127.0.0.1:99999"], ["99999", "tcp://"]),
         (["address=tcp://0.0.0.0:5555"], ["0.0.0.0", "keys=", "without_keys=true"]),

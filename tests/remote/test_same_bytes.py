@@ -54,6 +54,15 @@ def test_parts_of_a_result_are_all_rows_in_their_order_and_the_last_is_one(world
     assert len(parts) <= 2 + np.log2(worlds)
 
 
+def test_a_server_that_waits_without_sleeping_gives_the_same(cfg):
+    with (
+        served(cfg, 2, busy_wait_s=0.01) as server,
+        closing(torchrl_env(server, 2)) as there,
+        closing(VecaEnv(cfg, 2)) as here,
+    ):
+        assert digest(play(there, 10, 1)) == digest(play(here, 10, 1))
+
+
 def test_a_seed_without_end_is_refused(server):
     with closing(torchrl_env(server, 1, 2**600)) as env, pytest.raises(ValueError, match="seed"):
         env.reset()

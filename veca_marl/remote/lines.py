@@ -7,8 +7,10 @@ reads and writes; the server never does.
 from __future__ import annotations
 
 import os
+import select
 import socket
 import struct
+import time
 from collections.abc import Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
@@ -101,11 +103,15 @@ class FarEnd:
 
     Args:
         connection: What `line_pair` has returned.
+        busy_wait_s: See `veca_marl.remote.server.ServerCfg`.
     """
 
-    def __init__(self, connection: Connection[Any, Any]) -> None:
+    def __init__(self, connection: Connection[Any, Any], busy_wait_s: float = 0.0) -> None:
         self._socket = _as_socket(connection)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SMALLEST_BUFFER)
+        self._busy_wait_s = busy_wait_s
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
 
     def send(self, header: Any, data: Any) -> None:
         """Send a message.
@@ -125,6 +131,9 @@ class FarEnd:
         Raises:
             EOFError: If the server has ended.
         """
+        until = time.perf_counter() + self._busy_wait_s
+        while time.perf_counter() < until and not self._poll.poll(0):
+            pass
         header, data = _LENGTHS.unpack(self._exactly(_LENGTHS.size))
         whole = self._exactly(header + data)
         return whole[:header], whole[header:]

@@ -266,16 +266,19 @@ def _generator(words: Any) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(numbers))
 
 
-def serve_worlds(connection: Connection[Any, Any], cfg: WorldsCfg, worlds: int) -> None:
+def serve_worlds(
+    connection: Connection[Any, Any], cfg: WorldsCfg, worlds: int, busy_wait_s: float
+) -> None:
     """Build worlds and answer requests until this process is ended.
 
     Args:
         connection: The line to the server.
         cfg: The game.
         worlds: Number of worlds.
+        busy_wait_s: See `veca_marl.remote.server.ServerCfg`.
     """
     prepare_child(os.getppid())  # the process that forks those with worlds, ends with the server
-    line = FarEnd(connection)
+    line = FarEnd(connection, busy_wait_s)
     try:
         load_plugins(cfg.plugins)
         server = WorldServer(cfg.game, worlds)

@@ -45,6 +45,8 @@ class ServeOptions:
         without_keys: Whether everybody may connect who reaches the address.
         reconnect_s: Seconds for which worlds are kept whose client has lost its connection.
         limit_s: Seconds that worlds may take for one request, or to be built.
+        busy_wait_s: Seconds for which the process of a client waits for the next request without
+            sleeping, up to 1: a step is answered sooner, and a core is in use meanwhile.
     """
 
     address: str = "tcp://127.0.0.1:5555"
@@ -55,6 +57,7 @@ class ServeOptions:
     without_keys: bool = False
     reconnect_s: float = 60.0
     limit_s: float = 600.0
+    busy_wait_s: float = 0.0005
 
     def __post_init__(self) -> None:
         for name in ("worlds", "clients"):
@@ -63,6 +66,8 @@ class ServeOptions:
         for name in ("reconnect_s", "limit_s"):
             if not 0.0 < getattr(self, name) < 1e6:
                 raise ValueError(f"{name}={getattr(self, name)} must be positive, up to 1e6")
+        if not 0.0 <= self.busy_wait_s <= 1.0:
+            raise ValueError(f"busy_wait_s={self.busy_wait_s} must be from 0 to 1")
         if self.new_client is not None and self.keys is None:
             raise ValueError(f"new_client={self.new_client} needs keys=FOLDER")
         if self.keys is not None and self.without_keys:
@@ -99,6 +104,7 @@ def _serve(options: ServeOptions, overrides: list[str]) -> None:
             options.without_keys,
             options.reconnect_s,
             options.limit_s,
+            options.busy_wait_s,
         )
         chosen.check(options.keys is not None)
         known = None if options.keys is None else keys.load_server_keys(Path(options.keys))
