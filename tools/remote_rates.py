@@ -36,7 +36,7 @@ class RemoteRatesOptions:
         steps: Steps of each kind in a round.
         rounds: Number of rounds.
         encrypted: Whether the connection has keys.
-        busy_wait_s: Of the server.
+        busy_wait_s: Of the server, see `veca_marl.serve`.
     """
 
     task: str = "KickTheBall"

@@ -148,6 +148,20 @@ def test_parts_that_no_result_has_are_refused(specs, part):
             env.reset()
 
 
+def test_a_server_that_never_sends_the_first_part_is_given_up(specs):
+    size = layouts.outcome_type(specs).itemsize
+
+    def answer(request):
+        fields = {"hello": welcome(specs), "open": {}}.get(request.kind, {"part": 1})
+        return Message("done", request.number, fields, bytes(size)).frames()
+
+    with impostor(answer) as address:
+        there = RemoteWorlds(address, timeout_s=0.5)
+        env = VecaEnv(there.cfg, 2, 0, host=RemoteHost(there))
+        with closing(env), pytest.raises(RemoteError, match=naming("0.5 s", address)):
+            env.reset()
+
+
 def test_arrays_larger_than_the_specs_allow_are_not_read(specs):
     def answer(request):
         if request.kind == "hello":

@@ -169,14 +169,16 @@ def _check_below_null(overrides: Sequence[str]) -> None:
     Raises:
         ConfigError: One line that names both.
     """
-    nulls: list[str] = []
+    nulls: set[str] = set()
     for text in overrides:
         key, _, value = text.lstrip("+~").partition("=")
         above = next((one for one in nulls if key.startswith(f"{one}.")), None)
         if above is not None:
             raise ConfigError(f"{key}: {above}=null leaves no values there")
         if value.strip().lower() == "null":
-            nulls.append(key.strip())
+            nulls.add(key.strip())
+        else:
+            nulls.discard(key.strip())
 
 
 def prepare(overrides: Sequence[str]) -> list[str]:

@@ -109,7 +109,13 @@ class Channel:
     def ask_for_parts(
         self, parts: int, kind: str, fields: dict[str, Any], data: Any
     ) -> Iterator[Message]:
-        """Send a request whose result has several parts; yield them as they come, in their order.
+        """Send a request; yield the parts of its result, in order, each when it arrives.
+
+        Args:
+            parts: How many there are, at least 1.
+            kind: What is asked for.
+            fields: Its values.
+            data: Raw bytes of arrays.
 
         Raises:
             ValueError, RuntimeError, RemoteError: See `ask`.
@@ -140,7 +146,7 @@ class Channel:
         """Return a part of what the server answers to the present request, or its refusal.
 
         Returns:
-            The answer; None if it has not come by then, or was lost, since a later part comes.
+            The answer; None if it has not arrived by then, or a later part has: it was lost.
         """
         while time.monotonic() < until:
             self._note_events()
@@ -155,16 +161,19 @@ class Channel:
                 self._stop_monitor()
                 if message.number != self._number:  # of an earlier request, or a probe
                     continue
-                self._heard = time.monotonic()
                 if message.kind == REFUSED:
                     return message
                 if message.kind not in (DONE, PART):  # the server is working on it
+                    self._heard = time.monotonic()
                     continue
-                come = integer({PART_NUMBER: 0} | message.fields, PART_NUMBER, 0, parts - 1)
+                arrived = integer({PART_NUMBER: 0} | message.fields, PART_NUMBER, 0, parts - 1)
             except ProtocolError as error:
                 raise RemoteError(f"{self._address}: {error}") from None
-            if come >= part:  # earlier ones are sent again together with one that was lost
-                return message if come == part else None
+            if arrived == part:
+                self._heard = time.monotonic()
+                return message
+            if arrived > part:  # this one was lost; a server that never sends it is given up
+                return None
         return None
 
     def _note_events(self) -> None:

@@ -120,7 +120,7 @@ class RemoteWorlds:
     def reset(
         self, worlds: Sequence[int], rngs: Sequence[np.random.Generator]
     ) -> Iterator[Records]:
-        """Begin an episode in each of some worlds; yield records, in their order, as they come."""
+        """Begin an episode in each of some worlds; yield records, in order, as they arrive."""
         seeds = [seed_words(rng) for rng in rngs]
         fields = {"worlds": list(worlds), "seeds": seeds}
         return self._records(RESET, fields, b"", len(worlds))
@@ -128,7 +128,7 @@ class RemoteWorlds:
     def step(
         self, worlds: Sequence[int], actions: Records, kinds: Sequence[str]
     ) -> Iterator[Records]:
-        """Play one step in each of some worlds; yield records, in their order, as they come."""
+        """Play one step in each of some worlds; yield records, in order, as they arrive."""
         fields = {"worlds": list(worlds), "kinds": list(kinds)}
         return self._records(STEP, fields, actions.tobytes(), len(worlds))
 

@@ -38,12 +38,12 @@ class Worlds(Protocol):
     def reset(
         self, worlds: Sequence[int], rngs: Sequence[np.random.Generator]
     ) -> Iterator[Records]:
-        """Begin an episode in each of some worlds; yield records, in their order, as they come."""
+        """Begin an episode in each of some worlds; yield records, in order, as they arrive."""
 
     def step(
         self, worlds: Sequence[int], actions: Records, kinds: Sequence[str]
     ) -> Iterator[Records]:
-        """Play one step in each of some worlds; yield records, in their order, as they come."""
+        """Play one step in each of some worlds; yield records, in order, as they arrive."""
 
     def state(self, world: int) -> NDArray[np.float32]:
         """Return the state of a world."""
@@ -286,10 +286,10 @@ def begin(games: Sequence[RemoteGame], rngs: Sequence[np.random.Generator], worl
 
 
 def advance(games: Sequence[RemoteGame], worlds: Worlds) -> Iterator[Outcome]:
-    """Play one step in each of some games, whose actions are set; one message carries them.
+    """Play one step in each of some games with the actions that were set, by one request.
 
     Yields:
-        Outcomes, as they come: further worlds are simulated while an outcome is made use of.
+        The outcome of each game when it arrives; the server simulates further ones meanwhile.
     """
     if not games:
         return

@@ -120,7 +120,7 @@ def evaluate(
         seed: Seed of the starts and of the samples.
         exploration: Whether actions are sampled.
         first: Number of the first episode.
-        played: Is told of episodes that have ended, how many.
+        played: Called with the number of episodes that have ended since its last call.
     """
     worlds = env.batch_size[0]
     tallies = []

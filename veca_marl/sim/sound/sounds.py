@@ -96,7 +96,7 @@ class _HighPass:
     """The high-pass of all sounds, see `waveforms.high_pass`, over samples that come in parts.
 
     Attributes:
-        state: ``(n_sections, 2)``; all zeros where it emits nothing of earlier samples.
+        state: ``(n_sections, 2)`` of the filter; all zeros if earlier samples are not heard.
     """
 
     def __init__(self, sample_rate_hz: float) -> None:
@@ -112,10 +112,13 @@ class _HighPass:
 
 @kernel
 def _filter_sections(sections: Floats, samples: Floats, state: Floats, out: Samples) -> None:
-    """Filter by sections of second order in cascade, as `scipy.signal.sosfilt`, in direct form II.
+    """Filter by a cascade of second-order sections, as `scipy.signal.sosfilt` does.
+
+    Transposed direct form II. SciPy's function takes 70 us for the samples of a step, most of it
+    checks of its arguments.
 
     Args:
-        sections: ``(S, 6)``.
+        sections: ``(S, 6)`` coefficients b0, b1, b2, a0 = 1, a1, a2 of each section.
         samples: ``(n,)``.
         state: ``(S, 2)``, overwritten.
         out: ``(n,)``, overwritten.
