@@ -64,11 +64,6 @@ class ActionLayout:
     size: int
 
     @property
-    def parameters(self) -> int:
-        """Parameters of its distribution: logits, or means and scales."""
-        return self.size if self.discrete else 2 * self.size
-
-    @property
     def dimensions(self) -> int:
         """How many independent numbers are drawn: one choice, or those of the vector."""
         return 1 if self.discrete else self.size

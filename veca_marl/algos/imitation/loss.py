@@ -19,6 +19,7 @@ from torch import Tensor
 from torch.distributions import Distribution, Normal
 
 from veca_marl.algos.demonstration_files import Key
+from veca_marl.algos.networks.mixture import TanhNormalMixture
 from veca_marl.algos.specs import ActionLayout, action_key
 
 LARGEST_ACTION = 0.98
@@ -52,7 +53,9 @@ class ImitationLoss:
     squared error ``e`` is smallest at the scale ``sqrt(e + least_scale ** 2)``. With the
     likelihood of the demonstrated action alone, the scale of a policy that repeats a deterministic
     expert would shrink to zero: nothing could be explored from it, and gradients would grow with
-    the inverse square.
+    the inverse square. For a mixture with the weights ``w`` and the cross entropies ``h`` of its
+    normal distributions, the loss is ``-log(sum(w * exp(-h)))``: by Jensen's inequality an upper
+    bound of its cross entropy.
 
     Args:
         team: Name of the team.
@@ -90,7 +93,7 @@ class ImitationLoss:
                 agreements.append((distribution.logits.argmax(-1) == shown).float())
             else:
                 losses.append(self._of_vector(distribution, shown))
-                errors.append((distribution.loc.tanh() - shown).abs().mean(-1).detach())
+                errors.append((_likeliest(distribution) - shown).abs().mean(-1).detach())
         total = torch.stack(losses).sum(0) / self._dimensions
         return Imitated(
             _mean(total, counted), _mean_of(errors, counted), _mean_of(agreements, counted)
@@ -103,10 +106,22 @@ class ImitationLoss:
 
     def _of_vector(self, policy: Any, shown: Tensor) -> Tensor:
         target = shown.clamp(-LARGEST_ACTION, LARGEST_ACTION).atanh()
+        if isinstance(policy, TanhNormalMixture):
+            each = self._cross_entropy(policy, target.unsqueeze(-2))
+            return -(policy.logits.log_softmax(-1) - each).logsumexp(-1)
+        return self._cross_entropy(policy, target)
+
+    def _cross_entropy(self, policy: Any, target: Tensor) -> Tensor:
         normal = Normal(policy.loc, policy.scale, validate_args=False)
         spread = 0.5 * (self._least / policy.scale) ** 2
         entropy: Tensor = spread - normal.log_prob(target)
         return entropy.sum(-1)
+
+
+def _likeliest(policy: Any) -> Tensor:
+    mixture = isinstance(policy, TanhNormalMixture)
+    loc: Tensor = policy.likeliest_loc if mixture else policy.loc
+    return loc.tanh()
 
 
 def _mean(values: Tensor, counted: Tensor) -> Tensor:

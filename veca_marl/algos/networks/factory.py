@@ -18,7 +18,12 @@ from torch import nn
 
 from veca_marl.algos.algorithm import Algorithm, ChoiceRegistry
 from veca_marl.algos.networks.layers import perceptron, value_layer
-from veca_marl.algos.networks.policy_heads import SMALLEST_SCALE, action_distribution, policy_head
+from veca_marl.algos.networks.policy_heads import (
+    SMALLEST_SCALE,
+    action_distribution,
+    parameter_count,
+    policy_head,
+)
 from veca_marl.algos.sense_encoders import copy_parameters, encoders_of
 from veca_marl.algos.specs import TeamSpec
 
@@ -33,6 +38,10 @@ class NetworkCfg:
         initial_scale: Standard deviation of continuous actions before the first update, before
             tanh maps them to [-1, 1]: with 1 they are nearly uniform, with 0.3 nearly normal.
             Greater than 0.01.
+        modes: Number of normal distributions that are mixed for each vector of an action, for
+            algorithms that imitate: a mixture is close to an expert that acts in one of several
+            ways where the observation does not show in which. The deterministic action is the mean
+            of the distribution of most weight.
         not_parameters: Fields that a network with the same parameters may have differently.
         critics_only: Fields that do not concern the actor.
     """
@@ -43,8 +52,11 @@ class NetworkCfg:
     name: str = ""
     frozen: list[str] = field(default_factory=list)
     initial_scale: float = 1.0
+    modes: int = 1
 
     def __post_init__(self) -> None:
+        if self.modes < 1:
+            raise ValueError(f"network.modes must be at least 1, got {self.modes}")
         if not SMALLEST_SCALE < self.initial_scale < math.inf:
             raise ValueError(
                 f"network.initial_scale must be finite and above {SMALLEST_SCALE}, "
@@ -55,6 +67,18 @@ class NetworkCfg:
     def recurrent(self) -> bool:
         """Whether the network has hidden state and learns from sequences of steps."""
         return False
+
+
+def check_one_mode(cfg: NetworkCfg, algorithm: str) -> None:
+    """Check that the policies are no mixtures, of which entropy and divergence have no formula.
+
+    Raises:
+        ValueError: If they are.
+    """
+    if cfg.modes > 1:
+        raise ValueError(
+            f"algo.network.modes={cfg.modes} is for algo=bc and algo=dagger; {algorithm} needs 1"
+        )
 
 
 class NetworkFactory(ABC):
@@ -114,15 +138,20 @@ class NetworkFactory(ABC):
             encoder: Writes the features.
             hidden: Widths of hidden layers in each head.
         """
-        scale = self.cfg.initial_scale
+        scale, modes = self.cfg.initial_scale, self.cfg.modes
         heads = [
             policy_head(
-                self.team, part, layout, self.policy_layer(layout.parameters, hidden), scale
+                self.team,
+                part,
+                layout,
+                self.policy_layer(parameter_count(layout, modes), hidden),
+                scale,
+                modes,
             )
             for part, layout in self.spec.actions.items()
         ]
         return ProbabilisticTensorDictSequential(
-            encoder, *heads, action_distribution(self.team, self.spec.actions)
+            encoder, *heads, action_distribution(self.team, self.spec.actions, modes)
         )
 
     def policy_layer(self, outputs: int, hidden: Sequence[int] = ()) -> nn.Module:

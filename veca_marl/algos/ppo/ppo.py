@@ -20,6 +20,7 @@ from veca_marl.algos.imitation.term import ImitationCfg, ImitationTerm
 from veca_marl.algos.networks.factory import (
     NetworkCfg,
     TeamNetwork,
+    check_one_mode,
     check_same_network,
     copy_actor,
     make_network,
@@ -114,6 +115,7 @@ class PPOCfg(AlgorithmCfg):
         for name in ("epochs", "minibatches", "sequence_steps"):
             if getattr(self, name) < 1:
                 raise ValueError(f"algo.{name} must be at least 1, got {getattr(self, name)}")
+        check_one_mode(self.network, "ppo")
         check_entropy_coefficient(self.entropy_coefficient)
         if not 0.0 <= self.value_coefficient < math.inf:
             raise ValueError(

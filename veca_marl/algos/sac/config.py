@@ -9,7 +9,7 @@ from enum import Enum
 from veca_marl.algos.algorithm import AlgorithmCfg
 from veca_marl.algos.imitation.term import ImitationCfg
 from veca_marl.algos.networks.action_values import ActionValuesCfg, Normalisation
-from veca_marl.algos.networks.factory import NetworkCfg
+from veca_marl.algos.networks.factory import NetworkCfg, check_one_mode
 from veca_marl.algos.networks.multisense import MultisenseCfg
 
 
@@ -254,6 +254,7 @@ class SACCfg(AlgorithmCfg):
                 f"algo.sequence_steps={self.sequence_steps} must divide algo.batch_size, "
                 f"got {self.batch_size}"
             )
+        check_one_mode(self.network, "sac")
         if any(width < 1 for width in self.policy_hidden):
             raise ValueError(
                 f"algo.policy_hidden: widths must be positive, got {list(self.policy_hidden)}"
