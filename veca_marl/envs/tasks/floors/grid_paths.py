@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from veca_marl.envs.tasks.floors.places import clearances_m
-from veca_marl.sim.geometry import Bools, Floats
+from veca_marl.sim.geometry import Bools, Floats, Indices
 from veca_marl.sim.physics import PlaygroundCfg, Prop, World
 
 CELL_M = 0.1
@@ -36,11 +36,18 @@ class FloorGrid(NamedTuple):
         centres: Floats = self.lower_m + (indices + 0.5) * CELL_M
         return centres
 
-    def cell_of(self, place: Floats) -> tuple[int, int]:
-        """Return the indices of the cell that contains a place, or of the nearest one."""
-        index = np.floor((np.asarray(place)[:2] - self.lower_m) / CELL_M).astype(int)
-        x, y = np.clip(index, 0, np.array(self.shape) - 1).tolist()
-        return x, y
+    def cells_of(self, places: Floats) -> Indices:
+        """Return the indices of the cells that contain places, or of the nearest ones.
+
+        Args:
+            places: ``(..., 2)`` or ``(..., 3)`` metres.
+
+        Returns:
+            ``(..., 2)``.
+        """
+        cells = np.floor((places[..., :2] - self.lower_m) / CELL_M).astype(np.int64)
+        inside: Indices = np.minimum(np.maximum(cells, 0), np.array(self.shape) - 1)
+        return inside
 
 
 class Detour(NamedTuple):
@@ -147,15 +154,15 @@ class PathsTo:
         return point
 
     def _number(self, place: Floats) -> int:
-        x, y = self._grid.cell_of(place)
-        return x * self._grid.shape[1] + y
+        x, y = self._grid.cells_of(np.asarray(place)).tolist()
+        return int(x * self._grid.shape[1] + y)
 
     def _is_straight(self, start: Floats, end: Floats) -> bool:
         """Return whether the cells between two points are free; those of the start do not count."""
         count = max(1, math.ceil(math.dist(start, end) / (0.5 * CELL_M)))
-        shares = np.arange(2, count) / count
-        cells = (self._grid.cell_of(start + share * (end - start)) for share in shares)
-        return all(self._free[cell] for cell in cells)
+        shares = np.arange(2, count)[:, np.newaxis] / count
+        cells = self._grid.cells_of(start + shares * (end - start))
+        return bool(self._free[cells[:, 0], cells[:, 1]].all())
 
 
 def _edges(free: Bools) -> csr_array:
