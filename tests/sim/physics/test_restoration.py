@@ -9,7 +9,7 @@ import pytest
 from composed import compose
 from walking import ball, box, empty_world, film, let_pass, walker_in, wall
 
-from veca_marl.sim.physics import World
+from veca_marl.sim.physics import World, bullet_state
 from veca_marl.sim.physics.bullet_client import pybullet
 from veca_marl.sim.sound import SoundCfg, make_sound
 from veca_marl.sim.vision import Camera, look_at
@@ -221,3 +221,11 @@ def test_a_world_that_is_not_referenced_any_more_releases_its_client():
     del world
     gc.collect()
     assert not pybullet.isConnected(number)
+
+
+def test_a_state_has_the_same_bytes_where_files_are_on_a_disk(monkeypatch):
+    world = World(furnished())
+    in_memory = bullet_state.saved_state(world.client)
+    monkeypatch.setattr(bullet_state, "_FILES_IN_MEMORY", False)
+    assert bullet_state.saved_state(world.client) == in_memory
+    assert bullet_state.solving_order(in_memory)
