@@ -52,7 +52,7 @@ meets the bone; `docs/reference/touch.md` defines it.
 RADII = (0.5, 1.0, 2.0)
 """Radii of receptive fields as multiples of the thickness of the skin; on the body 0.3 to 1.1."""
 _STEPS = 100
-_POKES = 120
+_POKES = 480
 _DEPTH = 0.25
 _LEAST_NOTICED = 0.95
 _PAIRS = 24
