@@ -170,7 +170,7 @@ def test_algorithms_that_need_an_entropy_refuse_a_mixture(cfg):
         kl_divergence(mixture(1), mixture(1))
 
 
-@pytest.mark.parametrize("modes", [0, -1])
-def test_a_mixture_has_a_distribution(modes):
+@pytest.mark.parametrize("modes", [0, -1, 10**9])
+def test_a_mixture_has_some_distributions(modes):
     with pytest.raises(ValueError, match=naming("modes", str(modes))):
         network(modes=modes)

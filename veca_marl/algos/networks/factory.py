@@ -41,7 +41,7 @@ class NetworkCfg:
         modes: Number of normal distributions that are mixed for each vector of an action, for
             algorithms that imitate: a mixture is close to an expert that acts in one of several
             ways where the observation does not show in which. The deterministic action is the mean
-            of the distribution of most weight.
+            of the distribution of most weight. From 1 to 100.
         not_parameters: Fields that a network with the same parameters may have differently.
         critics_only: Fields that do not concern the actor.
     """
@@ -55,8 +55,8 @@ class NetworkCfg:
     modes: int = 1
 
     def __post_init__(self) -> None:
-        if self.modes < 1:
-            raise ValueError(f"network.modes must be at least 1, got {self.modes}")
+        if not 1 <= self.modes <= 100:
+            raise ValueError(f"network.modes must be from 1 to 100, got {self.modes}")
         if not SMALLEST_SCALE < self.initial_scale < math.inf:
             raise ValueError(
                 f"network.initial_scale must be finite and above {SMALLEST_SCALE}, "
