@@ -133,15 +133,20 @@ def test_arrays_of_another_size_are_refused(specs):
                 env.reset()
 
 
-@pytest.mark.parametrize("part", [-1, 2, "0", None, 2**60])
-def test_parts_that_no_result_has_are_refused(specs, part):
+def with_part(specs, part):
+    """Answer a greeting, and every further request with one part of a result."""
     size = layouts.outcome_type(specs).itemsize
 
     def answer(request):
         fields = {"hello": welcome(specs), "open": {}}.get(request.kind, {"part": part})
         return Message("done", request.number, fields, bytes(size)).frames()
 
-    with impostor(answer) as address:
+    return answer
+
+
+@pytest.mark.parametrize("part", [-1, 2, "0", None, 2**60])
+def test_parts_that_no_result_has_are_refused(specs, part):
+    with impostor(with_part(specs, part)) as address:
         there = RemoteWorlds(address, timeout_s=5.0)
         env = VecaEnv(there.cfg, 2, 0, host=RemoteHost(there))
         with closing(env), pytest.raises(RemoteError, match=naming("part", address)):
@@ -149,13 +154,7 @@ def test_parts_that_no_result_has_are_refused(specs, part):
 
 
 def test_a_server_that_never_sends_the_first_part_is_given_up(specs):
-    size = layouts.outcome_type(specs).itemsize
-
-    def answer(request):
-        fields = {"hello": welcome(specs), "open": {}}.get(request.kind, {"part": 1})
-        return Message("done", request.number, fields, bytes(size)).frames()
-
-    with impostor(answer) as address:
+    with impostor(with_part(specs, 1)) as address:
         there = RemoteWorlds(address, timeout_s=0.5)
         env = VecaEnv(there.cfg, 2, 0, host=RemoteHost(there))
         with closing(env), pytest.raises(RemoteError, match=naming("0.5 s", address)):
@@ -189,7 +188,8 @@ def test_numbers_of_any_bits_are_taken_as_they_are(specs):
         there = RemoteWorlds(address, timeout_s=5.0)
         env = VecaEnv(there.cfg, 1, 0, host=RemoteHost(there))
         with closing(env), np.errstate(over="ignore", invalid="ignore"):
-            env.rollout(3, break_when_any_done=False)
+            played = env.rollout(3, break_when_any_done=False)
+    assert played.batch_size == (1, 3)
 
 
 def test_a_reason_that_is_no_text_is_refused(specs):

@@ -8,7 +8,6 @@ from demonstrated import demonstrations_of_toy
 from fake_env import FakeEnv
 from refusals import naming
 from tensordict import TensorDict
-from torch.distributions import kl_divergence
 from torchrl.envs import ExplorationType, set_exploration_type
 from torchrl.modules import TanhNormal
 from training import SMALL
@@ -166,8 +165,14 @@ def test_the_loss_of_a_mixture_is_an_upper_bound_of_its_cross_entropy():
 def test_algorithms_that_need_an_entropy_refuse_a_mixture(cfg):
     with pytest.raises(ValueError, match=naming("algo.network.modes", "3", "bc", "dagger")):
         cfg(network=network())
-    with pytest.raises(NotImplementedError):
-        kl_divergence(mixture(1), mixture(1))
+
+
+def test_ppo_does_not_start_from_a_mixture():
+    def make(cfg):
+        return make_algorithm("agents", team_specs(FakeEnv(1))["agents"], cfg, torch.device("cpu"))
+
+    with pytest.raises(ValueError, match=naming("modes=3", " 1 ")):
+        make(PPOCfg(network=SMALL)).init_from(make(BCCfg(network=network())))
 
 
 @pytest.mark.parametrize("modes", [0, -1, 10**9])

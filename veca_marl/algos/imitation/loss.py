@@ -93,7 +93,7 @@ class ImitationLoss:
                 agreements.append((distribution.logits.argmax(-1) == shown).float())
             else:
                 losses.append(self._of_vector(distribution, shown))
-                errors.append((_likeliest(distribution) - shown).abs().mean(-1).detach())
+                errors.append((distribution.deterministic_sample - shown).abs().mean(-1).detach())
         total = torch.stack(losses).sum(0) / self._dimensions
         return Imitated(
             _mean(total, counted), _mean_of(errors, counted), _mean_of(agreements, counted)
@@ -116,12 +116,6 @@ class ImitationLoss:
         spread = 0.5 * (self._least / policy.scale) ** 2
         entropy: Tensor = spread - normal.log_prob(target)
         return entropy.sum(-1)
-
-
-def _likeliest(policy: Any) -> Tensor:
-    mixture = isinstance(policy, TanhNormalMixture)
-    loc: Tensor = policy.likeliest_loc if mixture else policy.loc
-    return loc.tanh()
 
 
 def _mean(values: Tensor, counted: Tensor) -> Tensor:

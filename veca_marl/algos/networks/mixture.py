@@ -1,7 +1,7 @@
-"""Mixtures of normal distributions: actions of which several, but not their mean, are right.
+"""Mixtures of normal distributions, for policies that imitate experts with several modes.
 
-An expert that goes round an obstacle on the left or on the right is imitated badly by one normal
-distribution: its mean walks into the obstacle.
+If an expert passes an obstacle on the left in some episodes and on the right in others, the mean of
+one normal distribution leads into the obstacle.
 """
 
 from __future__ import annotations
@@ -37,14 +37,9 @@ class TanhNormalMixture(Distribution):
         self.loc, self.scale, self.logits = loc, scale, logits
 
     @property
-    def likeliest_loc(self) -> Tensor:
-        """The mean before tanh of the normal distribution of most weight, ``(..., A)``."""
-        return _chosen(self.loc, self.logits.argmax(-1))
-
-    @property
     def deterministic_sample(self) -> Tensor:
-        """Its action, ``(..., A)``."""
-        return _bounded(self.likeliest_loc)
+        """The mean before tanh of the distribution with the greatest weight, as an action."""
+        return _bounded(_chosen(self.loc, self.logits.argmax(-1)))
 
     @torch.no_grad()
     def sample(self, sample_shape: Size | list[int] | tuple[int, ...] = ()) -> Tensor:
@@ -86,8 +81,8 @@ def draw_mixture(
 class MixtureParameters(nn.Module):
     """The parameters of a `TanhNormalMixture` from the output of a layer.
 
-    Means have different constants added to them, evenly spread over [-1, 1]: with equal means all
-    of them would receive nearly equal gradients, and remain one.
+    A different constant is added to each mean before tanh; they are spread evenly over [-1, 1].
+    Distributions with equal means would receive nearly equal gradients, and stay equal.
 
     Args:
         layer: Maps features to ``modes * (2 size + 1)`` numbers.
