@@ -32,7 +32,7 @@ _OWNER = struct.Struct("<Qi")  # pointer to the body, link
 _OWNER_AT = 504
 _ASLEEP = 2  # `ISLAND_SLEEPING`
 
-# PyBullet saves to files only; one on a disk takes 5 to 12 times as long as one in memory
+# PyBullet saves to files only; on a disk that takes several times as long as in memory
 _DESCRIPTORS = Path("/proc/self/fd")
 _FILES_IN_MEMORY = hasattr(os, "memfd_create") and _DESCRIPTORS.is_dir()
 
