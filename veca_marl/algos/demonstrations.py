@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import mmap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from veca_marl.algos.demonstration_files import (
     episodes_of,
     index_bytes,
 )
+from veca_marl.algos.mapped_files import expect_scattered_reads
 from veca_marl.algos.specs import action_key
 
 _BLOCK = 2**24  # bytes that are hashed at once
@@ -172,6 +173,23 @@ class Demonstrations:
                 raise DemonstrationsError(f"{self.folder} has no reward term {name!r} of {team!r}")
             reward += weight * self.rows[team, "info", name].double()
         self.rows[team, "reward"].copy_(reward)
+
+    def scattered(self, keys: Iterable[Key], index: Tensor) -> TensorDict:
+        """Return copies of rows from anywhere, with the shape of their numbers.
+
+        From then on nothing is read ahead, see `expect_scattered_reads`.
+
+        Args:
+            keys: Keys of arrays.
+            index: Numbers of rows, int64.
+        """
+        flat, found = index.flatten(), TensorDict({}, index.shape)
+        for key in keys:
+            column: Tensor = self.rows[key]
+            if column.nbytes:
+                expect_scattered_reads(column)
+            found[key] = column.index_select(0, flat).unflatten(0, index.shape)
+        return found
 
     def step_rows(self) -> Tensor:
         """Return the numbers of all rows that have an action, ``(steps,)`` int64."""

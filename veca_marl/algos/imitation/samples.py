@@ -61,7 +61,8 @@ class Samples:
         sequence: SequenceCfg,
         episodes: Sequence[int],
     ) -> None:
-        self._rows, self._team, self._spec, self._actor = demonstrations.rows, team, spec, actor
+        self._demonstrations, self._team = demonstrations, team
+        self._spec, self._actor = spec, actor
         self._recurrent = bool(initial_states(actor, ()))
         self._sequence = sequence if self._recurrent else ONE_STEP
         self._keys: list[Key] = [(team, "observation", sense) for sense in spec.observations]
@@ -103,11 +104,7 @@ class Samples:
         return sample
 
     def _read(self, index: Tensor, counted: Tensor) -> TensorDict:
-        sample = TensorDict({}, index.shape)
-        flat = index.flatten()
-        for key in self._keys:
-            column: Tensor = self._rows[key]
-            sample[key] = column.index_select(0, flat).unflatten(0, index.shape)
+        sample = self._demonstrations.scattered(self._keys, index)
         every = counted.unsqueeze(-1).expand(*counted.shape, self._spec.agents)
         sample[COUNTED] = every & sample[self._team, "mask"] if self._spec.masked else every
         return sample

@@ -24,6 +24,7 @@ from torch import Tensor
 from torchrl.data import LazyMemmapStorage, LazyTensorStorage, TensorDictReplayBuffer
 from torchrl.data.replay_buffers import Sequence
 
+from veca_marl.algos.mapped_files import expect_scattered_reads
 from veca_marl.algos.sac.config import ReplayCfg, Storage
 from veca_marl.algos.specs import TeamSpec, action_key
 from veca_marl.algos.storage import StorageNeeded, reserve_disk, reserve_memory, state_bytes
@@ -284,6 +285,7 @@ class _ReservedFiles(LazyMemmapStorage):
         super()._init(data)
         for array in self._storage.values(True, True):
             reserve_disk(Path(array.filename))
+            expect_scattered_reads(array)
 
 
 class Replay:
