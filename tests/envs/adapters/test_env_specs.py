@@ -5,7 +5,7 @@ import pytest
 import torch
 from torchrl.data import Bounded, Categorical, Unbounded
 
-from veca_marl.envs.adapters.torchrl.env import action_spec, done_spec, to_torchrl
+from veca_marl.envs.adapters.torchrl.env_specs import action_spec, done_spec, to_torchrl
 from veca_marl.sim.sense import ArraySpec
 
 

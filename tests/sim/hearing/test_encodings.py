@@ -6,7 +6,7 @@ from heard_scenes import Scene, tone_at
 from listening import RATE
 
 from veca_marl.sim.hearing import AudioQuality, Encoding, log_spectrum
-from veca_marl.sim.hearing.audio_sense import (
+from veca_marl.sim.hearing.encodings import (
     PHASE_LIMIT_HZ,
     Window,
     interaural_phase,

@@ -5,7 +5,7 @@ import pytest
 from refusals import naming
 
 from veca_marl.sim.hearing import AudioCfg, Encoding, Window
-from veca_marl.sim.hearing.audio_sense import WINDOW_SAMPLES, make_encoder
+from veca_marl.sim.hearing.encodings import WINDOW_SAMPLES, make_encoder
 from veca_marl.sim.hearing.infant_hearing import FULL_SCALE_DB_SPL, threshold_db_spl
 from veca_marl.sim.sound import SAMPLE_RATE_HZ
 

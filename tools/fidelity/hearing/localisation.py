@@ -11,12 +11,8 @@ import torch
 from tools.fidelity.law import Curve, Law, Mark, Plot, Section, at_least, at_most, between
 from veca_marl.sim.geometry import Floats, Pose
 from veca_marl.sim.hearing import AudioCfg, AudioQuality
-from veca_marl.sim.hearing.audio_sense import (
-    WINDOW_SAMPLES,
-    Encoding,
-    make_encoder,
-    make_receiver,
-)
+from veca_marl.sim.hearing.audio_sense import make_receiver
+from veca_marl.sim.hearing.encodings import WINDOW_SAMPLES, Encoding, make_encoder
 from veca_marl.sim.sound import SAMPLE_RATE_HZ, Clip, Room, SoundField, buzz
 
 _TEXT = """

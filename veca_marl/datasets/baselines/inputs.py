@@ -12,7 +12,7 @@ from torch import Tensor
 
 from veca_marl.algos.specs import ArrayLayout
 from veca_marl.datasets.storage import StoredDataset
-from veca_marl.sim.hearing.audio_sense import (
+from veca_marl.sim.hearing.encodings import (
     WINDOW_SAMPLES,
     Encoding,
     Window,
