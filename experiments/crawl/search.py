@@ -86,7 +86,7 @@ class Trial:
         self._game = Game(compose(["+task=CrawlBaby", f"body={body}", *shut]).game)
         self.body = self._game.players[0].body
         self._chest = self.body.bone_names.index("chest")
-        self._step_s = self._game.world.clock.step_s
+        self.step_s = self._game.world.clock.step_s
 
     def way_mps(self, pattern: GaitPattern, aside_rad: float, seed: int) -> tuple[float, float]:
         """Crawl towards a distant place for a time.
@@ -94,14 +94,14 @@ class Trial:
         Returns:
             Speed towards it, and the penalty of rotations and tilts of the trunk.
         """
-        crawl = self._start(pattern, seed)
+        crawl = self.start(pattern, seed)
         start, ahead = self._line()
         c, s = math.cos(aside_rad), math.sin(aside_rad)
         way = np.array([c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1]])
         spin, least = 0.0, 1.0
-        steps = round(WAY_S / self._step_s)
+        steps = round(WAY_S / self.step_s)
         for _ in range(steps):
-            self._step(crawl.towards(bearing_rad(self.body, start + 100.0 * way)))
+            self.step(crawl.towards(bearing_rad(self.body, start + 100.0 * way)))
             spin += self._spin() / steps
             least = min(least, self.face_down())
         speed = float((self.body.position[:2] - start) @ way) / WAY_S
@@ -109,14 +109,14 @@ class Trial:
 
     def back_mps(self, pattern: GaitPattern, ahead_s: float, seed: int) -> tuple[float, float]:
         """Crawl forwards with the present gait, then backwards; return speed and penalty."""
-        crawl = self._start(CRAWL, seed)
-        for _ in range(round(ahead_s / self._step_s)):
-            self._step(crawl.command())
-        crawl, start, ahead = CrawlGait(self.body, self._step_s, pattern), *self._line()
+        crawl = self.start(CRAWL, seed)
+        for _ in range(round(ahead_s / self.step_s)):
+            self.step(crawl.command())
+        crawl, start, ahead = CrawlGait(self.body, self.step_s, pattern), *self._line()
         spin, least = 0.0, 1.0
-        steps = round(BACK_S / self._step_s)
+        steps = round(BACK_S / self.step_s)
         for _ in range(steps):
-            self._step(crawl.command())
+            self.step(crawl.command())
             spin += self._spin() / steps
             least = min(least, self.face_down())
         speed = float((start - self.body.position[:2]) @ ahead) / BACK_S
@@ -124,21 +124,21 @@ class Trial:
 
     def round_rad(self, pattern: GaitPattern, turn: float, seed: int) -> tuple[float, float]:
         """Turn to one side for a time; return the angle, and the greatest distance in metres."""
-        crawl = self._start(pattern, seed)
+        crawl = self.start(pattern, seed)
         before, start = self.body.forward, self.body.position[:2]
         turned, away = 0.0, 0.0
-        for _ in range(round(ROUND_S / self._step_s)):
-            self._step(crawl.command(turn))
+        for _ in range(round(ROUND_S / self.step_s)):
+            self.step(crawl.command(turn))
             now = self.body.forward
             turned += math.atan2(before[0] * now[1] - before[1] * now[0], float(before @ now))
             before, away = now, max(away, math.dist(self.body.position[:2], start))
         return turned * turn, away
 
-    def _start(self, pattern: GaitPattern, seed: int) -> CrawlGait:
+    def start(self, pattern: GaitPattern, seed: int) -> CrawlGait:
         self._game.reset(np.random.default_rng([2026, seed]))
-        return CrawlGait(self.body, self._step_s, pattern)
+        return CrawlGait(self.body, self.step_s, pattern)
 
-    def _step(self, command: JointCommand) -> None:
+    def step(self, command: JointCommand) -> None:
         self.body.act(self.body.encode(command))
         self._game.advance()
 

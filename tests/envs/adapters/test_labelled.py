@@ -9,6 +9,9 @@ from torchrl.envs.utils import step_mdp
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
 from veca_marl.envs.adapters.torchrl.labelled import LABEL, LabelledEnv
 from veca_marl.envs.adapters.torchrl.scripted import ExpertPolicy
+from veca_marl.envs.core.game import from_parts
+from veca_marl.envs.experts.control.crawl_gait import CrawlGait
+from veca_marl.envs.experts.motor_skills import CrawlBabyExpert
 
 SHORT = "task.max_seconds=0.4"
 GAMES = {
@@ -74,3 +77,42 @@ def test_a_team_needs_an_expert_that_can_play_it():
     deaf = compose(["+task=KickTheBall", "senses/audio=deaf"]).game
     with pytest.raises(ValueError, match="audio"):
         LabelledEnv(deaf, 1, 0, teams=["agents"])
+
+
+CRAWL = ["+task=CrawlBaby", "senses/vision=blind", "senses/audio=deaf", "senses/touch=numb"]
+
+
+def test_the_expert_follows_the_body_only_where_an_action_was_not_its_label(monkeypatch):
+    asked = []
+    monkeypatch.setattr(CrawlBabyExpert, "follow_body", lambda expert: asked.append(expert.task))
+    env = LabelledEnv(compose(CRAWL).game, 3, 0, teams=["agents"])
+    tasks, state = [game.task for game in env.games], env.reset()
+    for others in ([], [1], [], [0, 2]):
+        state["agents", "action"] = state["agents", LABEL].clone()
+        state["agents", "action"][others, 0, 3] *= 0.5
+        asked.clear()
+        state = step_mdp(env.step(state))
+        assert asked == [tasks[world] for world in others]
+    asked.clear()
+    state["agents", "action"] = env.reset()["agents", LABEL]
+    env.step(state)
+    assert asked == []
+    env.close()
+
+
+def test_labels_of_a_gait_are_those_of_the_phase_at_which_the_body_is():
+    """The body is moved by the same gait half a stride ahead of the clock of the expert."""
+    env = LabelledEnv(compose(CRAWL).game, 1, 0, teams=["agents"])
+    state, (game,) = env.reset(), env.games
+    gait = CrawlGait(game.task.body, game.world.clock.step_s)
+    for _ in range(7):  # a stride takes 13.8 steps
+        gait.command()
+    pairs = []
+    for _ in range(100):
+        action = from_parts(game.task.body.encode(gait.command()))
+        state["agents", "action"] = torch.tensor(action, dtype=torch.float32).view(1, 1, -1)
+        pairs.append((state["agents", "action"], state["agents", LABEL]))
+        state = step_mdp(env.step(state))
+    env.close()
+    acted, labelled = (torch.stack(each[40:]).ravel() for each in zip(*pairs, strict=True))
+    assert torch.corrcoef(torch.stack([acted, labelled]))[0, 1] > 0.5

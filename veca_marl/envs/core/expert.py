@@ -57,6 +57,15 @@ class Expert(ABC, Generic[TaskT]):
             torque-controlled and position-controlled bodies.
         """
 
+    def follow_body(self) -> None:
+        """Continue from the state of the body; nothing by default.
+
+        Called before `act` where the last action of the player was not the one that `act` returned,
+        as in DAgger, where a policy acts and the expert labels. Experts whose motion depends on
+        time set their phase to that of the body: no policy could learn labels of a clock that it
+        does not observe.
+        """
+
 
 EXPERTS: Registry[type[Expert[Any]]] = Registry("expert of task")
 

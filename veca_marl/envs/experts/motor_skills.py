@@ -87,6 +87,10 @@ class CrawlBabyExpert(Expert[CrawlBaby]):
         """Return target angles as `JointCommand`."""
         return self._locomotion.to(self._goal)
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._locomotion.follow_body()
+
 
 @register_expert("RunBaby")
 class RunBabyExpert(SkillExpert):

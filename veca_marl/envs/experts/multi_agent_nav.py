@@ -180,6 +180,10 @@ class ObjectSearch:
         self._listen(audio)
         return self._search(turned_rad)
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._path.follow_body()
+
     def _approach_and_call(self, found: Floats, arrived: bool) -> Any:
         call = CALL if self._path.room == self._plan.room_of(found) else Call.none
         if not arrived:
@@ -258,3 +262,7 @@ class MultiAgentNavExpert(Expert[MultiAgentNav]):
         seen = task.target.position if task.sees_target(player) else None
         audio = None if self._ears is None else self._ears.log_magnitudes(observation["audio"])
         return self._search.command(audio, seen, player.name in task.arrived)
+
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._search.follow_body()

@@ -42,6 +42,10 @@ class ObjectNavExpert(Expert[ObjectNav]):
         """Return a command for the player's kind of body, see `Expert.act`."""
         return self._locomotion.to(self._paths.next_point(self.player.body.position))
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._locomotion.follow_body()
+
 
 @register_expert("ObjectPhysNav")
 class ObjectPhysNavExpert(ObjectNavExpert):

@@ -98,3 +98,7 @@ class PushOutExpert(Expert[PushOut]):
         if abs(bearing_rad(body, goal)) > clearances.back_rad:
             return self._locomotion.back()
         return self._locomotion.to(goal)
+
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._locomotion.follow_body()

@@ -238,6 +238,10 @@ class SoccerExpert(Expert[Soccer]):
         shooter = Shooter(here, self._locomotion.clearances, self.keeper())
         return self._locomotion.to(self._on_one_side(self.point(shooter)))
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._locomotion.follow_body()
+
     def point(self, shooter: Shooter) -> Floats:
         """Return the point to steer to, ``(2,)`` metres."""
         return attacking_point(shooter, self.task.pitch)

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
-from torchrl.data import Composite
+from torchrl.data import Composite, TensorSpec
 
 from veca_marl.envs.adapters.torchrl.env import VecaEnv
+from veca_marl.envs.adapters.torchrl.env_specs import TeamActions
 from veca_marl.envs.adapters.torchrl.fast_step import Arrays, Layout
 from veca_marl.envs.core.expert import check_expert, find_expert
 from veca_marl.envs.core.game import Outcome, from_parts
@@ -24,8 +26,9 @@ class LabelledEnv(VecaEnv):
 
     It has the form of the team's action, one leaf or a leaf for each part, and stands beside the
     observation: at the root before a step, under ``next`` after it. The expert is asked once per
-    step and never acts; its own state is that of an episode that others play. The label of a player
-    that is eliminated, and of a state in which the episode has ended, is zero.
+    step and never acts; its own state is that of an episode that others play. Where an action was
+    not the label, it is told so (`Expert.follow_body`). The label of a player that is eliminated,
+    and of a state in which the episode has ended, is zero.
 
     Args:
         cfg: See `VecaEnv`.
@@ -53,6 +56,9 @@ class LabelledEnv(VecaEnv):
             if player.team in self._labelled:
                 check_expert(expert, player, self.games[0].world.clock)
         self._add_specs()
+        specs = self.full_action_spec
+        self._labels = {team: _zeros(specs[team, "action"]) for team in self._labelled}
+        self._differs = {team: np.zeros(specs[team].shape, bool) for team in self._labelled}
 
     def _add_specs(self) -> None:
         spec: Composite = self.observation_spec.clone()
@@ -73,8 +79,15 @@ class LabelledEnv(VecaEnv):
     ) -> TensorDict:
         state = super()._reset(tensordict, episode=episode)
         for world in self._selected(tensordict, "_reset"):
+            for team in self._labelled:
+                self._differs[team][world] = False
             self._label(world, state)
         return state
+
+    def _command(self, worlds: list[int], actions: dict[str, TeamActions]) -> None:
+        super()._command(worlds, actions)
+        for team in self._labelled:
+            self._differs[team] = _differ(self._labels[team], actions[team])
 
     def _score(self, world: int, arrays: Arrays, outcome: Outcome) -> None:
         super()._score(world, arrays, outcome)
@@ -88,10 +101,33 @@ class LabelledEnv(VecaEnv):
             for index, player in enumerate(game.team(team)):
                 if player.name in game.eliminated:
                     continue
-                expert = game.expert_of(player)
+                row, expert = (world, index), game.expert_of(player)
+                if self._differs[team][row]:
+                    expert.follow_body()
                 command = expert.act(game.observe(player, expert.reads))
                 label = from_parts(player.body.encode(command))
-                _write(data[team][LABEL], (world, index), label)
+                _write(data[team][LABEL], row, label)
+                _write(self._labels[team], row, label)
+
+
+def _zeros(spec: TensorSpec) -> TeamActions:
+    """Return zeros of the form of a team's action, ``(W, n, ...)``."""
+    zeros = spec.zero()
+    if isinstance(zeros, TensorDictBase):
+        return {part: np.asarray(value) for part, value in zeros.items()}
+    return np.asarray(zeros)
+
+
+def _differ(one: TeamActions, other: TeamActions) -> NDArray[np.bool_]:
+    """Return in which worlds and of which players two actions differ, ``(W, n)``."""
+    pairs = zip(_parts(one), _parts(other), strict=True)
+    unequal = [(a != b).reshape(*a.shape[:2], -1).any(-1) for a, b in pairs]
+    differs: NDArray[np.bool_] = np.logical_or.reduce(unequal)
+    return differs
+
+
+def _parts(actions: TeamActions) -> list[NDArray[Any]]:
+    return [actions[part] for part in sorted(actions)] if isinstance(actions, dict) else [actions]
 
 
 def _write(target: Any, row: tuple[int, int], label: Any) -> None:

@@ -59,6 +59,8 @@ class GaitPattern:
         twist: Angles added to the trunk at full turn to the left, degrees.
         steering_s: Time constant of the low-pass filter of the turning command.
         full_turn_rad: Bearing at which the turning command saturates.
+        thigh_lag_rad: Phase of the gait before that of the thighs, see `CrawlGait.followed_rad`.
+            Mean over strides of a body that executes it (experiments/crawl/phase.py).
     """
 
     frequency_hz: float
@@ -71,6 +73,7 @@ class GaitPattern:
     twist: Mapping[str, float]
     steering_s: float
     full_turn_rad: float
+    thigh_lag_rad: float
 
 
 # result of experiments/crawl/search.py, continued by an evolution strategy after the joint dynamics
@@ -117,6 +120,7 @@ CRAWL = GaitPattern(
     },
     steering_s=0.22,
     full_turn_rad=0.67,
+    thigh_lag_rad=0.85,
 )
 
 # likewise; it does not steer
@@ -157,6 +161,7 @@ BACK = GaitPattern(
     twist={},
     steering_s=0.31,
     full_turn_rad=0.66,
+    thigh_lag_rad=-2.94,
 )
 
 
@@ -188,9 +193,10 @@ class CrawlGait:
     """
 
     def __init__(self, body: Humanoid, step_s: float, pattern: GaitPattern = CRAWL) -> None:
-        self.pattern, self._step_s = pattern, step_s
+        self.pattern, self._body, self._step_s = pattern, body, step_s
         self._index = {name: index for index, name in enumerate(body.joint_names)}
         self._time_s, self._turn, self._start = 0.0, 0.0, body.joint_angles()
+        self._offset_rad = 0.0
 
     def towards(self, bearing_rad: float) -> JointCommand:
         """Return joint targets for one step that steer to a bearing.
@@ -208,11 +214,33 @@ class CrawlGait:
                 the time constant `GaitPattern.steering_s`.
         """
         share = min(1.0, self._time_s / _FADE_IN_S)
-        phase = 2.0 * math.pi * self.pattern.frequency_hz * self._time_s
+        phase = self.phase_rad
         self._turn += (turn - self._turn) * min(1.0, self._step_s / self.pattern.steering_s)
         self._time_s += self._step_s
         angles = self._start + share * (self._angles(phase) - self._start)
         return JointCommand(angles, horizon_s=self._step_s)
+
+    def follow_body(self) -> None:
+        """Set the phase to that which the body has, see `followed_rad`."""
+        self._offset_rad += self.followed_rad() - self.phase_rad
+
+    @property
+    def phase_rad(self) -> float:
+        """Phase of the next command."""
+        return 2.0 * math.pi * self.pattern.frequency_hz * self._time_s + self._offset_rad
+
+    def followed_rad(self) -> float:
+        """Return the phase that the body follows: that of its thighs and their lag.
+
+        The phase of the thighs is the angle in the phase plane of the difference d of their
+        flexions, left less right: ``atan2(d, d' / (2 pi f))``, as in studies of human gait (Hamill,
+        van Emmerik, Heiderscheit & Li 1999, Clin. Biomech. 14, 297).
+        """
+        left, right = (self._index[f"{side}_thigh.flexion"] for side in "lr")
+        angles, rates = self._body.joint_angles(), self._body.joint_velocities()
+        radians_per_s = 2.0 * math.pi * self.pattern.frequency_hz
+        rate = (rates[left] - rates[right]) / radians_per_s
+        return math.atan2(angles[left] - angles[right], rate) + self.pattern.thigh_lag_rad
 
     def _angles(self, phase: float) -> Floats:
         """Return the joint angles at a phase of the gait, ``(82,)`` rad."""

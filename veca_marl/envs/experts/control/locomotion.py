@@ -106,6 +106,10 @@ class Locomotion(Protocol):
         """Move backwards; on hands and knees the heading is not controlled."""
         ...
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        ...
+
 
 class WalkerLocomotion:
     """`Locomotion` of a walker.
@@ -146,6 +150,9 @@ class WalkerLocomotion:
     def back(self, call: Call = Call.none) -> tuple[float, float, Call]:
         """See `Locomotion.back`."""
         return -1.0, 0.0, call
+
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`; a walker's command depends on its pose alone."""
 
 
 class CrawlLocomotion:
@@ -193,6 +200,11 @@ class CrawlLocomotion:
     def back(self, call: Call = Call.none) -> JointCommand:
         """See `Locomotion.back`."""
         return (self._rising() or self._with_pattern(BACK).command())._replace(call=call)
+
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        if self._gait is not None:
+            self._gait.follow_body()
 
     def _rising(self) -> JointCommand | None:
         """Return the command of a body that has fallen; a new gait begins when it is up."""

@@ -81,6 +81,10 @@ class WallRecovery:
         self._track.clear()
         return self._locomotion.back(call)
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._locomotion.follow_body()
+
     def _is_turning(self, place: Floats) -> bool:
         """Count the steps for which a place has been aside; return whether there is time left."""
         is_aside = abs(bearing_rad(self._body, place)) > _ASIDE_RAD
@@ -214,6 +218,10 @@ class PathFollower:
     def rest(self, call: Call = Call.none) -> Any:
         """Stay."""
         return self._locomotion.rest(call)
+
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._locomotion.follow_body()
 
     def _waypoint(self, goal: Floats) -> Floats:
         """Return the next point to steer to, ``(2,)`` metres.
