@@ -8,7 +8,8 @@ from composed import compose
 
 from veca_marl.envs.core.game import Game
 from veca_marl.envs.core.game_cfg import Script
-from veca_marl.envs.experts.control.posture_transitions import FallRecovery
+from veca_marl.envs.experts.control.posture_transitions import FallRecovery, GetUp
+from veca_marl.envs.experts.control.sit_up import SitUp
 from veca_marl.sim.body.humanoid.postures import ON_ALL_FOURS, ON_BACK, ON_BELLY
 
 
@@ -67,3 +68,49 @@ def test_a_body_that_crawls_is_left_alone_and_one_that_stays_on_its_back_is_not(
     commands = [recovery.command() for _ in range(steps + 1)]
     assert commands[: steps - 1] == [None] * (steps - 1)
     assert commands[-1] is not None
+
+
+def play(game, skill, seconds, *, follows, acts):
+    """Ask a skill for commands, which the body of a game executes or not."""
+    body = game.players[0].body
+    for _ in range(round(seconds / game.cfg.clock.step_s)):
+        if follows:
+            skill.follow_body()
+        command = skill.command()
+        if acts:
+            body.act(body.encode(command))
+            game.advance()
+
+
+def lying(game, posture):
+    game.reset(np.random.default_rng(3))
+    body = game.players[0].body
+    body.place((0.0, 0.0, 0.0), 0.0, posture)
+    return body, game.cfg.clock.step_s
+
+
+def test_getting_up_waits_for_a_body_that_others_move(game):
+    """The body does nothing: by its clock alone the skill would be complete."""
+    for follows in (False, True):
+        get_up = GetUp(*lying(game, ON_BELLY))
+        play(game, get_up, 2.5, follows=follows, acts=False)
+        assert get_up.is_complete is not follows
+
+
+def test_a_body_that_is_followed_and_obeys_gets_up(game):
+    body, step_s = lying(game, ON_BACK)
+    get_up = GetUp(body, step_s)
+    play(game, get_up, 5.0, follows=True, acts=True)
+    assert get_up.is_complete
+    assert body.bone("neck").position[2] > 0.15
+
+
+def test_a_body_that_is_followed_and_obeys_sits_up_and_one_that_falls_gets_up_again(game):
+    body, step_s = lying(game, ON_BACK)
+    sit_up = SitUp(body, step_s)
+    play(game, sit_up, 8.0, follows=True, acts=True)
+    assert body.bone("neck").position[2] > 0.25
+    body.place((0.0, 0.0, 0.0), 0.0, ON_BACK)
+    on_back, fresh = sit_up, SitUp(body, step_s)
+    on_back.follow_body()
+    assert np.allclose(on_back.command().targets, fresh.command().targets)

@@ -43,6 +43,10 @@ class SkillExpert(Expert[Task]):
         """Return target angles ``(82,)`` in rad, or a `JointCommand`."""
         return self._skill.command()
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        self._skill.follow_body()
+
 
 @register_expert("TurnBaby")
 class TurnBabyExpert(SkillExpert):

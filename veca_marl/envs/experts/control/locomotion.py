@@ -203,6 +203,7 @@ class CrawlLocomotion:
 
     def follow_body(self) -> None:
         """See `Expert.follow_body`."""
+        self._recovery.follow_body()
         if self._gait is not None:
             self._gait.follow_body()
 

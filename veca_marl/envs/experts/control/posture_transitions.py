@@ -10,6 +10,10 @@ from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import ON_BACK, Posture
 from veca_marl.sim.geometry import Floats
 
+# root mean square of the angles; experts of SitBaby are within 0.06 at the end of each pose on the
+# way to sitting, and 0.4 away at its start
+_AT_POSE_RAD = 0.15
+
 
 class KeyPoses:
     """Target angles that move to a key pose at a limited speed.
@@ -43,6 +47,11 @@ class KeyPoses:
         change = self._poses[name] - self.targets
         self.targets = self.targets + np.clip(change, -limit_rad, limit_rad)
         return self.targets.copy()
+
+    def is_at(self, name: str) -> bool:
+        """Return whether the body is in a key pose."""
+        errors = self._poses[name] - self._body.joint_angles()
+        return float(np.sqrt((errors**2).mean())) < _AT_POSE_RAD
 
 
 # set by hand, then improved by a random search for the return of TurnBaby, with torque control
@@ -160,6 +169,9 @@ class TurnOver:
         self._pose = chosen
         return self._sides[self._side].toward(chosen, _TURNING_RADPS)
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`; the pose follows from where chest and pelvis face."""
+
     def _start(self, side: int) -> None:
         """Move over a side from the present joint angles: 0 is the left one, 1 the right one."""
         self._side = side
@@ -215,6 +227,7 @@ _RISING_POSES = {
 _RISING_RADPS = 10.0
 _DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1}
 _NEXT_STAGE = {"lie": "prepare", "prepare": "push"}
+_PATIENCE = 2.0  # time after which a pose counts as out of reach, of the duration of its stage
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
 _HORIZON = 0.5  # prediction of the joint angles in agent steps; 1 damps more
 
@@ -235,6 +248,7 @@ class GetUp:
         self._body, self._step_s = body, step_s
         self._turn = TurnOver(body, step_s)
         self._key_poses = KeyPoses(body, _RISING_POSES, step_s)
+        self._waited_s = 0.0  # since the stage began, while others act
         self.reset()
 
     def reset(self) -> None:
@@ -256,10 +270,29 @@ class GetUp:
             self._end_stage()
         return JointCommand(targets, _HORIZON * self._step_s)
 
+    def follow_body(self) -> None:
+        """Return to the stage at which the body is; see `Expert.follow_body`.
+
+        A body that is not on its belly turns over. A stage ends when its pose is reached, or after
+        twice its duration, since a limb may be caught below the body.
+        """
+        if self._stage == "lie":
+            return
+        if not self._is_on_belly():
+            self.reset()
+            return
+        duration_s = _DURATION_S[self._stage]
+        self._waited_s += self._step_s
+        ends = self._key_poses.is_at(self._stage) or self._waited_s > _PATIENCE * duration_s
+        self._elapsed_s = duration_s if ends else 0.0
+
+    def _is_on_belly(self) -> bool:
+        return bool(self._body.bone("chest").forward[2] < -_ON_BELLY)
+
     def _targets(self) -> Floats:
         if self._stage != "lie":
             return self._key_poses.toward(self._stage, _RISING_RADPS)
-        if not self._body.bone("chest").forward[2] < -_ON_BELLY:
+        if not self._is_on_belly():
             self._elapsed_s = 0.0
         return self._turn.command()
 
@@ -270,7 +303,8 @@ class GetUp:
             self.is_complete = True
 
     def _begin(self, stage: str) -> None:
-        self._stage, self._elapsed_s = stage, 0.0
+        self._stage = stage
+        self._elapsed_s, self._waited_s = 0.0, 0.0
         if stage == "prepare":
             self._key_poses.reset()
 
@@ -278,7 +312,7 @@ class GetUp:
 # vertical component of the front of the chest: -1 on the belly, 1 on the back; at most -0.6 in 20 s
 # of crawling, pushing and dribbling
 _FALLEN = -0.3
-_PATIENCE_S = 0.4  # a body that rolls over by itself has not fallen
+_FALLEN_S = 0.4  # a body that rolls over by itself has not fallen
 
 
 class FallRecovery:
@@ -308,7 +342,12 @@ class FallRecovery:
         self._is_rising = not self._get_up.is_complete
         return command
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`."""
+        if self._is_rising:
+            self._get_up.follow_body()
+
     def _has_fallen(self) -> bool:
         is_down = self._body.bone("chest").forward[2] > _FALLEN
         self._fallen_s = self._fallen_s + self._step_s if is_down else 0.0
-        return self._fallen_s >= _PATIENCE_S
+        return self._fallen_s >= _FALLEN_S

@@ -89,6 +89,18 @@ class SitUp:
         self._advance_stage()
         return command
 
+    def follow_body(self) -> None:
+        """Return to the stage at which the body is; see `Expert.follow_body`.
+
+        A body that has fallen gets up at once, and sitting back ends when its pose is reached.
+        """
+        if self._stage == "get up":
+            self._get_up.follow_body()
+        elif self._is_down():
+            self.reset()
+        elif self._stage == "sit":
+            self._elapsed_s = _SIT_S if self._key_poses.is_at("sit") else 0.0
+
     def _stage_command(self) -> JointCommand:
         if self._stage == "get up":
             return self._get_up.command()
@@ -119,7 +131,10 @@ class SitUp:
             self.reset()
 
     def _has_failed(self) -> bool:
-        return self._elapsed_s >= _RISE_S and self._body.bone("neck").position[2] < _FAILED_M
+        return self._elapsed_s >= _RISE_S and self._is_down()
+
+    def _is_down(self) -> bool:
+        return bool(self._body.bone("neck").position[2] < _FAILED_M)
 
     def _begin(self, stage: str) -> None:
         self._stage, self._elapsed_s, self._bend = stage, 0.0, _BENT_AT_FIRST

@@ -136,6 +136,9 @@ class Stepping:
         self._time_s = 0.0
         self._angles: Floats | None = None  # pitch and yaw in the step before
 
+    def follow_body(self) -> None:
+        """See `Expert.follow_body`; the few steps before the fall keep their clock."""
+
     def command(self) -> JointCommand:
         """Return the target angles of the next step."""
         p, balance = self._pattern, self._balance()
