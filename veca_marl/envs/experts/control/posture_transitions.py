@@ -10,10 +10,10 @@ from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import ON_BACK, Posture
 from veca_marl.sim.geometry import Floats
 
-# root mean square of the angles: half of what the expert of SitBaby is away from each pose on the
-# way to sitting when it begins to move there (0.43 to 0.47; at the end 0.04 to 0.07). With 0.15 a
-# policy of DAgger stayed at this distance from the first pose, where two labels alternated.
-_AT_POSE_RAD = 0.25
+# root mean square of the angles. The expert of SitBaby is 0.43 to 0.47 away from a pose when it
+# begins to move there, and 0.04 to 0.07 at the end. With 0.15 a policy of DAgger stayed just out of
+# the first pose, where two labels alternated; with 0.25 a body that obeys tips over.
+_AT_POSE_RAD = 0.2
 
 
 class KeyPoses:
