@@ -13,7 +13,7 @@ from training import SMALL
 
 from veca_marl.algos.algorithm import make_algorithm
 from veca_marl.algos.cloning import BCCfg, DaggerCfg
-from veca_marl.algos.cloning.dagger import ExpertActs
+from veca_marl.algos.cloning.dagger import Acts, ExpertActs
 from veca_marl.algos.networks.memory import with_memory
 from veca_marl.algos.networks.multisense import Memory, MultisenseCfg, Parameters
 from veca_marl.algos.ppo import PPOCfg
@@ -142,13 +142,30 @@ def dagger(**numbers):
     return DaggerCfg(**{**given, "learning_rate": 3e-3, **numbers})
 
 
+@pytest.mark.parametrize("acts", list(Acts))
 @pytest.mark.parametrize("memory", list(Memory))
-def test_dagger_learns_from_labels_alone(memory):
-    learner = make(dagger(network=network(memory=memory)))
+def test_dagger_learns_from_labels_alone(memory, acts):
+    learner = make(dagger(network=network(memory=memory), acts=acts))
     measured = [learner.learn(collected(learner, seed=batch)) for batch in range(5)]
     assert list(measured[0]) == list(learner.measures)
     assert [one["expert_fraction"] for one in measured] == [1.0, 0.5, 0.0, 0.0, 0.0]
     assert score(learner) > 0.9
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+def test_a_policy_that_acts_most_likely_collects_what_evaluations_play(form):
+    base = FakeEnv(64, 0, **form)
+    state = base.reset()
+    state["agents", "expert_action"] = right_action(base)
+
+    def acted(acts, kind):
+        learner = make(dagger(acts=acts, expert_frames=0), **form)
+        with torch.no_grad(), set_exploration_type(kind):
+            return TensorDict({"action": learner.explorer(state.clone())["agents", "action"]})
+
+    played = acted(Acts.sampled, ExplorationType.DETERMINISTIC)
+    assert (acted(Acts.most_likely, ExplorationType.RANDOM) == played).all()
+    assert not (acted(Acts.sampled, ExplorationType.RANDOM) == played).all()
 
 
 def test_dagger_draws_a_part_of_each_update_from_demonstrations(tmp_path):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase, TensorDictSequential
 from torch import Tensor
-from torchrl.envs import ExplorationType
+from torchrl.envs import ExplorationType, set_exploration_type
 from torchrl.envs.utils import exploration_type
 
 from veca_marl.algos.acting import Arrays
@@ -28,12 +29,28 @@ from veca_marl.algos.storage import StorageNeeded
 LABEL = "expert_action"
 
 
+class Acts(Enum):
+    """Which actions a policy takes while it collects.
+
+    Attributes:
+        sampled: Drawn from its distribution. They get away from states in which the most likely
+            action does nothing, such as the mean of two ways round an obstacle.
+        most_likely: The deterministic ones, those of evaluations. Noise in all joints keeps a body
+            from postures that the expert reaches: then its states are not those that a policy
+            without noise meets.
+    """
+
+    sampled = "sampled"
+    most_likely = "most_likely"
+
+
 @dataclass
 class DaggerCfg(ImitatorCfg):
     """Numbers of DAgger; all of them are ours.
 
     Attributes:
         updates_per_frame: Updates for each frame that is collected.
+        acts: See `Acts`.
         expert_frames: Frames over which the fraction of steps in which the expert acts falls from 1
             to 0; 0 lets the policy act from the start.
         demonstrated: Fraction of an update that is drawn from demonstrations, if there are any.
@@ -43,6 +60,7 @@ class DaggerCfg(ImitatorCfg):
 
     name: str = "dagger"
     updates_per_frame: float = 0.03125
+    acts: Acts = Acts.sampled
     expert_frames: int = 20_000
     demonstrated: float = 0.25
     replay: ReplayCfg = field(default_factory=lambda: ReplayCfg(warm_up_frames=1_000))
@@ -65,6 +83,25 @@ class DaggerCfg(ImitatorCfg):
     def check_budget(self, frames: int) -> None:
         """See `AlgorithmCfg`: the frames of the warm-up precede the first update."""
         self.replay.check_budget(frames)
+
+
+class MostLikely(TensorDictModuleBase):
+    """Takes the deterministic action of a policy, whatever the exploration type asks for.
+
+    Args:
+        policy: The policy.
+    """
+
+    def __init__(self, policy: TensorDictModuleBase) -> None:
+        super().__init__()
+        self.policy = policy
+        self.in_keys, self.out_keys = list(policy.in_keys), list(policy.out_keys)
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write the action into `tensordict` and return it."""
+        with set_exploration_type(ExplorationType.DETERMINISTIC):
+            written: TensorDictBase = self.policy(tensordict)
+        return written
 
 
 class ExpertActs(TensorDictModuleBase):
@@ -130,7 +167,8 @@ class Dagger(Imitator):
         actions = {action_key(team, part): label for part, label in labels.items()}
         self._expert = ExpertActs(actions).to(device)
         self._set_fraction(0)
-        self._explorer = TensorDictSequential(self._actor, self._expert)
+        acting = self._actor if cfg.acts is Acts.sampled else MostLikely(self._actor)
+        self._explorer = TensorDictSequential(acting, self._expert)
         self._memory = memory_keys(self._actor, team)
         span = Span(cfg.burn_in, cfg.sequence_steps, 1) if self._memory else Span(0, 1, 1)
         keys = StoredKeys.of(team, spec, self._memory)
