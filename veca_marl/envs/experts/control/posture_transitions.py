@@ -10,11 +10,6 @@ from veca_marl.sim.body.humanoid import Humanoid, JointCommand
 from veca_marl.sim.body.humanoid.postures import ON_BACK, Posture
 from veca_marl.sim.geometry import Floats
 
-# root mean square of the angles. The expert of SitBaby is 0.43 to 0.47 away from a pose when it
-# begins to move there, and 0.04 to 0.07 at the end. With 0.15 a policy of DAgger stayed just out of
-# the first pose, where two labels alternated; with 0.25 a body that obeys tips over.
-_AT_POSE_RAD = 0.2
-
 
 class KeyPoses:
     """Target angles that move to a key pose at a limited speed.
@@ -49,10 +44,10 @@ class KeyPoses:
         self.targets = self.targets + np.clip(change, -limit_rad, limit_rad)
         return self.targets.copy()
 
-    def is_at(self, name: str) -> bool:
-        """Return whether the body is in a key pose."""
+    def error_rad(self, name: str) -> float:
+        """Return how far the body is from a key pose: the root mean square of the angles."""
         errors = self._poses[name] - self._body.joint_angles()
-        return float(np.sqrt((errors**2).mean())) < _AT_POSE_RAD
+        return float(np.sqrt((errors**2).mean()))
 
 
 # set by hand, then improved by a random search for the return of TurnBaby, with torque control
@@ -229,6 +224,11 @@ _RISING_RADPS = 10.0
 _DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1}
 _NEXT_STAGE = {"lie": "prepare", "prepare": "push"}
 _PATIENCE = 2.0  # time after which a pose counts as out of reach, of the duration of its stage
+# the body is 0.43 to 0.47 away from a pose when it begins to move there, and 0.04 to 0.07 at the end.
+# With 0.15 a policy of DAgger stayed just out of the first pose, where two labels alternated; with
+# 0.25 a body that obeys tips over.
+_AT_POSE_RAD = 0.2
+_RAISED_M = 0.155  # height of the top of the chest on extended arms; the end of pushing is at 0.18
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
 _HORIZON = 0.5  # prediction of the joint angles in agent steps; 1 damps more
 
@@ -274,8 +274,9 @@ class GetUp:
     def follow_body(self) -> None:
         """Return to the stage at which the body is; see `Expert.follow_body`.
 
-        A body that is not on its belly turns over. A stage ends when its pose is reached, or after
-        twice its duration, since a limb may be caught below the body.
+        A body that is not on its belly turns over. A stage ends when its pose is reached. After
+        twice its duration pushing is tried without that, since a limb may be caught below the body,
+        and pushing that fails is prepared again.
         """
         if self._stage == "lie":
             return
@@ -284,8 +285,15 @@ class GetUp:
             return
         duration_s = _DURATION_S[self._stage]
         self._waited_s += self._step_s
-        ends = self._key_poses.is_at(self._stage) or self._waited_s > _PATIENCE * duration_s
-        self._elapsed_s = duration_s if ends else 0.0
+        is_late = self._waited_s > _PATIENCE * duration_s
+        if is_late and self._stage == "push":
+            self._begin("prepare")
+        else:
+            self._elapsed_s = duration_s if is_late or self._has_reached_pose() else 0.0
+
+    def _has_reached_pose(self) -> bool:
+        is_raised = self._stage != "push" or self._body.bone("neck").position[2] > _RAISED_M
+        return bool(is_raised) and self._key_poses.error_rad(self._stage) < _AT_POSE_RAD
 
     def _is_on_belly(self) -> bool:
         return bool(self._body.bone("chest").forward[2] < -_ON_BELLY)

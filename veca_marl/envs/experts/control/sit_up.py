@@ -51,6 +51,8 @@ _POSES = {
 _SIT_RADPS = 4.0
 _SIT_S, _RISE_S = 1.0, 1.5
 _FAILED_M = 0.12  # below this height of the top of the chest the attempt has failed
+_ON_HANDS_M = 0.14  # below it the body is no longer on hands and knees, where it is at 0.15 to 0.19
+_AT_POSE_RAD = 0.15  # the expert is within 0.07 at the end; with 0.2 a body that obeys stays lower
 _HORIZON = 0.5  # before rising: prediction of the joint angles in agent steps; 1 damps more
 _BENT_AT_FIRST, _RISING_S = 0.8, 0.5  # share of the bend at the start; time from bent to upright
 _ON_HEELS_RAD = math.radians(45.0)  # from the vertical; a thigh that is steeper has left the heel
@@ -96,10 +98,11 @@ class SitUp:
         """
         if self._stage == "get up":
             self._get_up.follow_body()
-        elif self._is_down():
+        elif self._is_below(_ON_HANDS_M):
             self.reset()
         elif self._stage == "sit":
-            self._elapsed_s = _SIT_S if self._key_poses.is_at("sit") else 0.0
+            is_sitting = self._key_poses.error_rad("sit") < _AT_POSE_RAD
+            self._elapsed_s = _SIT_S if is_sitting else 0.0
 
     def _stage_command(self) -> JointCommand:
         if self._stage == "get up":
@@ -131,10 +134,10 @@ class SitUp:
             self.reset()
 
     def _has_failed(self) -> bool:
-        return self._elapsed_s >= _RISE_S and self._is_down()
+        return self._elapsed_s >= _RISE_S and self._is_below(_FAILED_M)
 
-    def _is_down(self) -> bool:
-        return bool(self._body.bone("neck").position[2] < _FAILED_M)
+    def _is_below(self, height_m: float) -> bool:
+        return bool(self._body.bone("neck").position[2] < height_m)
 
     def _begin(self, stage: str) -> None:
         self._stage, self._elapsed_s, self._bend = stage, 0.0, _BENT_AT_FIRST
