@@ -224,9 +224,9 @@ _RISING_RADPS = 10.0
 _DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1}
 _NEXT_STAGE = {"lie": "prepare", "prepare": "push"}
 _PATIENCE = 2.0  # time after which a pose counts as out of reach, of the duration of its stage
-# the body is 0.43 to 0.47 away from a pose when it begins to move there, and 0.04 to 0.07 at the end.
-# With 0.15 a policy of DAgger stayed just out of the first pose, where two labels alternated; with
-# 0.25 a body that obeys tips over.
+# the body is 0.43 to 0.47 away from a pose when it begins to move there, and 0.04 to 0.07 at the
+# end. With 0.15 a policy of DAgger stayed just out of the first pose, where two labels alternated;
+# with 0.25 a body that obeys tips over.
 _AT_POSE_RAD = 0.2
 _RAISED_M = 0.155  # height of the top of the chest on extended arms; the end of pushing is at 0.18
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
