@@ -228,7 +228,7 @@ _PATIENCE = 2.0  # time after which a pose counts as out of reach, of the durati
 # end. With 0.15 a policy of DAgger stayed just out of the first pose, where two labels alternated;
 # with 0.25 a body that obeys tips over.
 _AT_POSE_RAD = 0.2
-_FLAT_M = 0.1  # height of the top of the chest; a body that has prepared is at 0.11 to 0.12
+_UNPREPARED_RAD = 0.35
 _RAISED_M = 0.155  # height of the top of the chest on extended arms; the end of pushing is at 0.18
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
 _HORIZON = 0.5  # prediction of the joint angles in agent steps; 1 damps more
@@ -277,7 +277,7 @@ class GetUp:
 
         A body that is not on its belly turns over. A stage ends when its pose is reached. After
         twice its duration pushing is tried without that, since a limb may be caught below the body;
-        pushing that takes so long is prepared again if the body lies flat.
+        pushing that takes so long is prepared again, unless the body still is as prepared.
         """
         if self._stage == "lie":
             return
@@ -288,7 +288,7 @@ class GetUp:
         is_late = self._waited_s > _PATIENCE * _DURATION_S[self._stage]
         if self._has_reached_pose() or (is_late and self._stage == "prepare"):
             self._elapsed_s = _DURATION_S[self._stage]
-        elif is_late and self._body.bone("neck").position[2] < _FLAT_M:
+        elif is_late and self._key_poses.error_rad("prepare") > _UNPREPARED_RAD:
             self._begin("prepare")
         else:
             self._elapsed_s = 0.0
