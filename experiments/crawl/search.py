@@ -7,7 +7,8 @@ python experiments/crawl/search.py --measure           # measures the present ga
 
 The search is an evolution strategy (SepCMA: Ros and Hansen 2008). A gait is evaluated on two
 bodies, one with position control and one with torque control; within a generation all gaits have
-the same starts. The result is printed.
+the same starts. The result is printed. It has the lag of the thighs of the gait at the beginning;
+`phase.py` measures its own.
 """
 
 from __future__ import annotations
@@ -40,14 +41,15 @@ STEPS = {
     "shortening": 0.25,
 }  # standard deviations of the search by the ends of names
 DEGREES = 7.0  # standard deviation of all other parameters, which are angles
+MEASURED = "thigh_lag_rad"  # no parameter of the motion: no score depends on it
 FALLEN = 0.5  # cosine of the angle between the front of the chest and straight down after a fall
 Numbers = dict[str, float]
 
 
 def numbers_of(pattern: Any, name: str = "") -> Numbers:
-    """Return all numbers of a gait by their path in it."""
+    """Return all numbers of a gait that the search varies, by their path in it."""
     if isinstance(pattern, float):
-        return {name: pattern}
+        return {} if name.endswith(MEASURED) else {name: pattern}
     found: Numbers = {}
     for key, part in parts_of(pattern).items():
         found |= numbers_of(part, f"{name}/{key}")
@@ -57,7 +59,7 @@ def numbers_of(pattern: Any, name: str = "") -> Numbers:
 def pattern_of(numbers: Numbers, like: Any, name: str = "") -> Any:
     """Return a copy of a gait with other numbers."""
     if isinstance(like, float):
-        return numbers[name]
+        return numbers.get(name, like)
     parts = {
         key: pattern_of(numbers, part, f"{name}/{key}") for key, part in parts_of(like).items()
     }

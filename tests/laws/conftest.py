@@ -18,7 +18,7 @@ WITH_WALKERS = ("PushOut2v2", "SoccerTwoPlayer")
 # tasks that the quick suite plays with every adapter and with extreme actions: besides those above
 # one with hands, one with verbs and doors, and one of another suite
 WITH_EVERY_ADAPTER = (*WITH_OTHER_BODY, "GrabObject", "BabyzumasRevenge", "HandRegard")
-# those whose experts label what others do: by a path, by its ears, by gaits, stages and a script
+# those in which it asks experts for labels: of a path, by hearing, of gaits, stages and a script
 LABELLED = ("ObjectNav", "KickTheBall", "CrawlBaby", "SitBaby", "PushOut1v1", "GrabObject")
 # those that it plays in the worlds of a server: one agent, two teams with joints, several agents
 ON_A_SERVER = ("KickTheBall", "PushOut1v1", "MultiAgentNav")

@@ -11,9 +11,9 @@ from torch import Tensor
 def expect_scattered_reads(array: Tensor) -> None:
     """Let the system read of a mapped file what is asked for, and nothing ahead of it.
 
-    What it reads ahead of random rows is not used, and displaces rows from memory that are. For
-    files of twice the memory the rate of random rows of 24 kB rises from below 200 to 5000 per
-    second. It is advice: a system that does not take it reads the same values.
+    What it reads ahead of random rows is rarely used, and displaces other rows from memory: files
+    that are larger than the memory would be read many times over. This is advice: a system that
+    does not take it reads the same values.
 
     Args:
         array: All rows of a file that is mapped into memory from its beginning on.

@@ -97,7 +97,7 @@ def test_getting_up_waits_for_a_body_that_others_move(game):
         assert get_up.is_complete is not follows
 
 
-def test_a_body_that_is_followed_and_obeys_gets_up(game):
+def test_a_body_that_executes_the_labels_gets_up(game):
     body, step_s = lying(game, ON_BACK)
     get_up = GetUp(body, step_s)
     play(game, get_up, 5.0, follows=True, acts=True)
@@ -105,12 +105,12 @@ def test_a_body_that_is_followed_and_obeys_gets_up(game):
     assert body.bone("neck").position[2] > 0.15
 
 
-def test_a_body_that_is_followed_and_obeys_sits_up_and_one_that_falls_gets_up_again(game):
+def test_a_body_that_executes_the_labels_sits_up_and_gets_up_again_after_a_fall(game):
     body, step_s = lying(game, ON_BACK)
     sit_up = SitUp(body, step_s)
     play(game, sit_up, 8.0, follows=True, acts=True)
     assert body.bone("neck").position[2] > 0.25
     body.place((0.0, 0.0, 0.0), 0.0, ON_BACK)
-    on_back, fresh = sit_up, SitUp(body, step_s)
-    on_back.follow_body()
-    assert np.allclose(on_back.command().targets, fresh.command().targets)
+    fresh = SitUp(body, step_s)
+    sit_up.follow_body()
+    assert np.allclose(sit_up.command().targets, fresh.command().targets)

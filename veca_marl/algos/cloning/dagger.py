@@ -33,11 +33,10 @@ class Acts(Enum):
     """Which actions a policy takes while it collects.
 
     Attributes:
-        sampled: Drawn from its distribution. They get away from states in which the most likely
-            action does nothing, such as the mean of two ways round an obstacle.
-        most_likely: The deterministic ones, those of evaluations. Noise in all joints keeps a body
-            from postures that the expert reaches: then its states are not those that a policy
-            without noise meets.
+        sampled: Drawn from its distribution. Where the labels have several modes, their mean can be
+            an action that changes nothing; samples do not remain in such a state.
+        most_likely: The deterministic actions, those of evaluations. The states that are labelled
+            are then those that evaluations reach, which noise in many joints can prevent.
     """
 
     sampled = "sampled"

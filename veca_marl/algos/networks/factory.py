@@ -39,8 +39,8 @@ class NetworkCfg:
             tanh maps them to [-1, 1]: with 1 they are nearly uniform, with 0.3 nearly normal.
             Greater than 0.01.
         modes: Number of normal distributions in the mixture for each vector of an action, from 1 to
-            100; more than 1 for algorithms that imitate. A mixture can represent an expert whose
-            action depends on something that the observation does not show. The deterministic
+            100; more than 1 for algorithms that imitate. A mixture can represent labels that
+            depend on something that the observation does not show. The deterministic
             action is the mean of the distribution with the greatest weight.
         not_parameters: Fields that a network with the same parameters may have differently.
         critics_only: Fields that do not concern the actor.

@@ -60,10 +60,10 @@ class Expert(ABC, Generic[TaskT]):
     def follow_body(self) -> None:
         """Continue from the state of the body; nothing by default.
 
-        Called before `act` where the last action of the player was not the one that `act` returned,
-        as in DAgger, where a policy acts and the expert labels. Experts whose motion depends on
-        time set their phase to that of the body: no policy could learn labels of a clock that it
-        does not observe.
+        Called before `act` if the last action of the player was not the one that `act` returned, as
+        in DAgger, where a policy acts and the expert only labels. An expert with a clock, such as a
+        gait, sets it to the phase of the body: labels that depend on a clock which the policy does
+        not observe cannot be learnt.
         """
 
 

@@ -166,7 +166,7 @@ class TurnOver:
         return self._sides[self._side].toward(chosen, _TURNING_RADPS)
 
     def follow_body(self) -> None:
-        """See `Expert.follow_body`; the pose follows from where chest and pelvis face."""
+        """See `Expert.follow_body`; the pose depends on the directions of chest and pelvis."""
 
     def _start(self, side: int) -> None:
         """Move over a side from the present joint angles: 0 is the left one, 1 the right one."""
@@ -223,12 +223,13 @@ _RISING_POSES = {
 _RISING_RADPS = 10.0
 _DURATION_S = {"lie": 0.4, "prepare": 0.5, "push": 1.1}
 _NEXT_STAGE = {"lie": "prepare", "prepare": "push"}
-_PATIENCE = 2.0  # time after which a pose counts as out of reach, of the duration of its stage
-# the body is 0.43 to 0.47 away from a pose when it begins to move there, and 0.04 to 0.07 at the
-# end. With 0.15 a policy of DAgger stayed just out of the first pose, where two labels alternated;
-# with 0.25 a body that obeys tips over.
+# for `follow_body`: a pose counts as out of reach after so many times the duration of its stage
+_PATIENCE = 2.0
+# Root mean square of the angles within which a pose is reached. The expert is 0.43 to 0.47 away
+# when it begins to move there, and 0.04 to 0.07 at the end. With 0.15 a policy of DAgger came to
+# rest outside, where two labels alternated; with 0.25 a body that executes the labels tips over.
 _AT_POSE_RAD = 0.2
-_UNPREPARED_RAD = 0.35
+_UNPREPARED_RAD = 0.35  # beyond it a body is no longer prepared to push
 _RAISED_M = 0.155  # height of the top of the chest on extended arms; the end of pushing is at 0.18
 _ON_BELLY = 0.7  # cosine of the angle between the front of the chest and straight down
 _HORIZON = 0.5  # prediction of the joint angles in agent steps; 1 damps more
@@ -275,9 +276,9 @@ class GetUp:
     def follow_body(self) -> None:
         """Return to the stage at which the body is; see `Expert.follow_body`.
 
-        A body that is not on its belly turns over. A stage ends when its pose is reached. After
-        twice its duration pushing is tried without that, since a limb may be caught below the body;
-        pushing that takes so long is prepared again, unless the body still is as prepared.
+        A body that is not on its belly turns over. A stage ends when its pose is reached. Preparing
+        also ends after twice its duration, since a limb may be caught below the body. After as many
+        durations of pushing, a body that has left the prepared pose prepares again.
         """
         if self._stage == "lie":
             return
@@ -314,8 +315,7 @@ class GetUp:
             self.is_complete = True
 
     def _begin(self, stage: str) -> None:
-        self._stage = stage
-        self._elapsed_s, self._waited_s = 0.0, 0.0
+        self._stage, self._elapsed_s, self._waited_s = stage, 0.0, 0.0
         if stage == "prepare":
             self._key_poses.reset()
 

@@ -137,7 +137,7 @@ class Stepping:
         self._angles: Floats | None = None  # pitch and yaw in the step before
 
     def follow_body(self) -> None:
-        """See `Expert.follow_body`; the few steps before the fall keep their clock."""
+        """See `Expert.follow_body`; the clock is kept: it lasts for two or three steps only."""
 
     def command(self) -> JointCommand:
         """Return the target angles of the next step."""
